@@ -37,6 +37,7 @@ struct CaptureJob {
     BatchOptions batch = {};  ///< batch.frames may be a block of `of`
     std::string block = {};   ///< "" = all, else as Task::block() says
     LoadedFrames loaded = {}; ///< decoded for the first look; the walk takes them
+    bool as_views = false;    ///< its clouds are noisy images of one camera each, though they have no grid
     double extent_m = 0;      ///< of its scene: the median of SceneExtent::diagonal_m; 0 = not looked at
 
     [[nodiscard]] const std::filesystem::path& folder() const { return batch.outputs.folder; }

@@ -64,6 +64,23 @@ double suited_radius(double usual, double extent) {
     return std::min(usual, step * decade);
 }
 
+/// Clouds without a grid that one camera took each, and noisy: rays from such points read far walls as closed.
+void settle_views(CaptureJob& job, std::span<const DepthImage> seen) {
+    const bool no_grid = std::ranges::none_of(job.loaded, [](const auto& each) {
+        return !each.second.frame.cloud || each.second.frame.cloud->organised() ||
+               each.second.frame.camera.pinhole.fx != 0;
+    });
+    if (!no_grid || std::ranges::any_of(seen, [](const DepthImage& view) { return view.z_m.empty(); }))
+        return;
+    job.as_views = job.batch.noise.any();
+    if (job.as_views)
+        job.capture.warnings.emplace_back(
+            "points seen by one camera at the origin, with a depth sensor's noise: they are "
+            "computed as its image. --clouds points casts rays from every point.");
+    else
+        job.batch.noise = {};
+}
+
 Workers* without_workers(std::string& why_none) {
     why_none = "no device was opened: no GPU, and only points to compute";
     return nullptr;
@@ -80,11 +97,14 @@ void CaptureRuns::look_at(CaptureJob& job) const {
         return;
     const bool colour = shows_colour(job.batch.outputs, !asked_.recording_cloud.empty() || job.batch.outputs.mcap);
     const bool by_points = asked_.clouds != CloudWalk::view && !job.capture.camera;
-    const std::vector<DepthImage> seen =
-        first_look(job.capture, job.of, &job.loaded, colour,
-                   by_points ? CloudAo(asked_.cloud_ao()).most_at_once() : std::numeric_limits<std::size_t>::max());
+    const bool may_be_views = by_points && asked_.clouds == CloudWalk::automatic && measures_noise && !images;
+    const std::vector<DepthImage> seen = first_look(
+        job.capture, job.of, &job.loaded, colour,
+        by_points ? CloudAo(asked_.cloud_ao()).most_at_once() : std::numeric_limits<std::size_t>::max(), may_be_views);
     if (measures_noise)
         job.batch.noise = measure_noise(seen);
+    if (may_be_views)
+        settle_views(job, seen);
     if (!job.capture.unit.arbitrary())
         job.extent_m = typical_extent(seen);
     const std::set<std::size_t> wanted(job.batch.frames.begin(), job.batch.frames.end());
@@ -101,7 +121,7 @@ CaptureRuns::Prepared CaptureRuns::prepare(CaptureJob& job) {
     const std::lock_guard alone(alone_);
     const bool needs_no_view = asked_.chosen_setup().make_for_points() != nullptr;
     job.batch.cloud_tiles = asked_.cloud_tiles;
-    job.batch.cloud_walk = needs_no_view ? CloudWalk::points : asked_.clouds;
+    job.batch.cloud_walk = needs_no_view ? CloudWalk::points : job.as_views ? CloudWalk::view : asked_.clouds;
     const bool by_points = computes_points(job);
     const bool no_device = by_points && !asked_.asks_for_device(job.capture);
     Workers* workers = no_device && !workers_ && !gpu::may_have_gpu() && all_by_points(job)

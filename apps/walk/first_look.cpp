@@ -1,6 +1,7 @@
 #include "apps/walk/first_look.h"
 
 #include "apps/walk/large_frames.h"
+#include "apps/walk/point_clouds.h"
 #include "projection/base/error.h"
 #include "projection/base/spread.h"
 #include "projection/base/stopwatch.h"
@@ -14,7 +15,7 @@
 namespace scanshade {
 
 std::vector<DepthImage> first_look(const Capture& capture, const std::vector<std::size_t>& frames, LoadedFrames* kept,
-                                   bool with_colour, std::size_t most_points) {
+                                   bool with_colour, std::size_t most_points, bool one_view) {
     constexpr std::size_t most = 5;
     const std::vector<std::size_t> chosen = spread(most, frames.size());
     std::vector<DepthImage> images(chosen.size());
@@ -29,7 +30,7 @@ std::vector<DepthImage> first_look(const Capture& capture, const std::vector<std
                 Frame frame = capture.load(frames[chosen[i]], with_colour);
                 const double ms = stopwatch.ms();
                 const bool image = !frame.cloud || frame.cloud->organised() || frame.cloud->pixels_of_one_image;
-                if (image)
+                if (image || (one_view && is_one_view(frame)))
                     images[i] = project(frame);
                 if (kept && (image || frames.size() == 1))
                     loaded[i] = {std::move(frame), ms};

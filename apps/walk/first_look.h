@@ -19,11 +19,12 @@ struct LoadedFrame {
 using LoadedFrames = std::map<std::size_t, LoadedFrame>; ///< by index in the capture
 
 /// Depth images of up to five of the frames, spread evenly; empty ones of frames that cannot be loaded, and of clouds
-/// without a grid, which are no sensor's image. `kept`, if given, receives the frames, with their colour if
-/// `with_colour`. Of several clouds without a grid it keeps none, since they may be large.
-/// Clouds without a grid of more than `most_points` are not looked at, if they are computed from disk.
+/// without a grid, which are no sensor's image: but, with `one_view`, those that is_one_view() tells. `kept`, if given,
+/// receives the frames, with their colour if `with_colour`. Of several clouds without a grid it keeps none, since they
+/// may be large. Clouds without a grid of more than `most_points` are not looked at, if they are computed from disk.
 [[nodiscard]] std::vector<DepthImage> first_look(const Capture& capture, const std::vector<std::size_t>& frames,
                                                  LoadedFrames* kept = nullptr, bool with_colour = false,
-                                                 std::size_t most_points = std::numeric_limits<std::size_t>::max());
+                                                 std::size_t most_points = std::numeric_limits<std::size_t>::max(),
+                                                 bool one_view = false);
 
 } // namespace scanshade

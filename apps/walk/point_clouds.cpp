@@ -1,10 +1,12 @@
 // Clouds that no single camera sees.
 #include "apps/walk/point_clouds.h"
 
+#include "ao/cloud/surface/cloud_surface.h"
 #include "io/clouds/cloud_edit.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "projection/base/error.h"
+#include "projection/base/statistics.h"
 #include "projection/project.h"
 
 #include <cmath>
@@ -32,6 +34,29 @@ bool takes_points(const Frame& frame, CloudWalk walk, std::vector<std::string>& 
     } catch (const Error& none) {
         notes.push_back(fmt::format("{}: rays from every point.", none.what()));
         return true;
+    }
+}
+
+bool is_one_view(const Frame& frame) {
+    constexpr std::size_t fewest = 30000;
+    constexpr double nearest_m = 0.1, farthest_m = 30;
+    const std::vector<Vector3d>& points = frame.cloud->points;
+    if (frame.cloud->organised() || points.size() < fewest || !triangles_of(*frame.cloud).empty())
+        return false;
+    std::vector<double> depths;
+    for (const Vector3d& point : points)
+        if (point.allFinite())
+            depths.push_back(point.z());
+    if (const double middle = median(std::move(depths), 0.0); middle < nearest_m || middle > farthest_m)
+        return false;
+    const NormalOrientation seen = guessed_orientation(points, std::nullopt, false);
+    if (seen.kind != NormalOrientation::Kind::viewpoint || !seen.point.isZero())
+        return false;
+    try {
+        (void)camera_of(frame);
+        return true;
+    } catch (const Error&) {
+        return false;
     }
 }
 

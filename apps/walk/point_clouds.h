@@ -16,6 +16,10 @@ namespace scanshade {
 /// is the grid of a pinhole image. `notes` receives the reason.
 [[nodiscard]] bool takes_points(const Frame& frame, CloudWalk walk, std::vector<std::string>& notes);
 
+/// Whether the points of a cloud without a grid are those that a camera at the origin saw, looking along z: nearly all
+/// within its view and seen first from there, 0.1 to 30 m away, and enough for an image.
+[[nodiscard]] bool is_one_view(const Frame& frame);
+
 /// Where the scanner stood, in the cloud's own coordinates: as its file says, or the origin where a layout has the pose
 /// of a scanner whose clouds stay in its frame. None if neither is known.
 [[nodiscard]] std::optional<Eigen::Vector3d> scanner_of(const Frame& frame);

@@ -366,26 +366,6 @@ TEST_F(CliTest, clouds_need_no_vulkan_driver_and_depth_images_name_its_package) 
     }
 }
 
-TEST_F(CliTest, a_depth_image_written_as_a_cloud_is_computed_as_the_image_it_was) {
-    const std::string scene = (folder / "scene").string(), image = (folder / "image").string(),
-                      cloud = (folder / "cloud").string();
-    ASSERT_EQ(run_program(fmt::format("generate office -o {} --frames 1 --size 160x120 --truth=no", scene)).exit_code,
-              0);
-    ASSERT_EQ(run_program(fmt::format("run {} -o {} --write ao,cloud --radius 0.5", scene, image)).exit_code, 0);
-    const std::string points = fs::directory_iterator(folder / "image/clouds")->path().string();
-    ASSERT_EQ(run_program(fmt::format("run {} -o {} --radius 0.5", points, cloud)).exit_code, 0);
-    const json of_image = json::parse(read_bytes(folder / "image/manifest.json")),
-               of_cloud = json::parse(read_bytes(folder / "cloud/manifest.json"));
-    EXPECT_EQ(of_cloud["method"], of_image["method"]);
-    EXPECT_NE(of_cloud["depth_noise"].get<std::string>().find("steps of 0.0028 z^2 m"), std::string::npos);
-    EXPECT_NEAR(of_cloud["frames"][0]["mean_visibility"].get<double>(),
-                of_image["frames"][0]["mean_visibility"].get<double>(), 0.002);
-    const auto told = run_program("inspect " + points);
-    EXPECT_NE(told.out.find("the pixels of one image"), std::string::npos) << told.out;
-    const auto by_rays = run_program(fmt::format("run {} -o {} --overwrite --clouds points", points, cloud));
-    EXPECT_NE(by_rays.err.find("rays from every point"), std::string::npos) << by_rays.err;
-}
-
 TEST_F(CliTest, clouds_without_colours_of_their_own_take_visibility_as_grey) {
     std::vector<std::string> warnings;
     for (const bool black : {false, true}) {
