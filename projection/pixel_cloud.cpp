@@ -166,6 +166,15 @@ bool are_pixels(const Rays& rays, const Axis& u, const Axis& v) {
 
 } // namespace
 
+double middle_depth(const Cloud& cloud) {
+    constexpr std::size_t enough = 1 << 16;
+    std::vector<double> some;
+    for (std::size_t i = 0; i < cloud.points.size(); i += std::max<std::size_t>(1, cloud.points.size() / enough))
+        if (const Eigen::Vector3d& point = cloud.points[i]; point.allFinite() && point.z() != 0)
+            some.push_back(std::abs(point.z()));
+    return median(std::move(some), 0);
+}
+
 std::optional<PixelCloud> pixel_cloud(const Cloud& cloud) {
     constexpr double worst_rms_px = 0.2; // 0.29 of points anywhere
     if (cloud.organised())

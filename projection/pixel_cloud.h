@@ -7,6 +7,9 @@
 
 namespace scanshade {
 
+/// The median of |z| of a sample of the points, but of those at 0; 0 where there are none.
+[[nodiscard]] double middle_depth(const Cloud& cloud);
+
 /// Programs write a depth image as a cloud row by row and leave its holes out. All points then lie on the rays of a
 /// grid of pixels, whose pitch the steps from point to point tell. `flipped`: they look along -z with y up (OpenGL).
 struct PixelCloud {

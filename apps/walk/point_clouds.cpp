@@ -6,10 +6,9 @@
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "projection/base/error.h"
-#include "projection/base/statistics.h"
+#include "projection/pixel_cloud.h"
 #include "projection/project.h"
 
-#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
@@ -39,16 +38,12 @@ bool takes_points(const Frame& frame, CloudWalk walk, std::vector<std::string>& 
 }
 
 bool is_one_view(const Frame& frame) {
-    constexpr std::size_t fewest = 30000, enough = 1 << 16;
+    constexpr std::size_t fewest = 30000;
     constexpr double nearest_m = 0.1, farthest_m = 30;
     const std::vector<Vector3d>& points = frame.cloud->points;
     if (frame.cloud->organised() || points.size() < fewest || !triangles_of(*frame.cloud).empty())
         return false;
-    std::vector<double> depths;
-    for (std::size_t i = 0; i < points.size(); i += std::max<std::size_t>(1, points.size() / enough))
-        if (points[i].allFinite())
-            depths.push_back(points[i].z());
-    if (const double middle = median(std::move(depths), 0.0); middle < nearest_m || middle > farthest_m)
+    if (const double middle = middle_depth(*frame.cloud); middle < nearest_m || middle > farthest_m)
         return false;
     const NormalOrientation seen = guessed_orientation(points, std::nullopt, false);
     if (seen.kind != NormalOrientation::Kind::viewpoint || !seen.point.isZero())

@@ -4,25 +4,13 @@
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "projection/base/error.h"
-#include "projection/base/statistics.h"
 #include "projection/pixel_cloud.h"
 
-#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 
 namespace scanshade {
 namespace {
-
-/// Median of what is not 0, of a sample; 0 where nothing is.
-double middle_z(const Cloud& cloud) {
-    constexpr std::size_t enough = 1 << 16;
-    std::vector<double> some;
-    for (std::size_t i = 0; i < cloud.points.size(); i += std::max<std::size_t>(1, cloud.points.size() / enough))
-        if (const Eigen::Vector3d& point = cloud.points[i]; point.allFinite() && point.z() != 0)
-            some.push_back(std::abs(point.z()));
-    return median(std::move(some), 0);
-}
 
 /// Depth cameras see 0.1 to 30 m. What they see at 100 to 30,000 is in millimetres.
 bool may_be_metres(double middle) { return middle >= 0.1 && middle <= 30; }
@@ -43,7 +31,7 @@ void take_for_millimetres(Frame& frame, double middle) {
 /// none.
 void see_pixels(Frame& frame) {
     Cloud& cloud = *frame.cloud;
-    const double middle = middle_z(cloud);
+    const double middle = middle_depth(cloud);
     if (!may_be_metres(middle) && !may_be_millimetres(middle))
         return;
     const std::optional<PixelCloud> found = pixel_cloud(cloud);
@@ -83,7 +71,7 @@ void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame)
     if (frame.cloud->records->viewpoint)
         frame.world_from_camera = frame.cloud->records->viewpoint;
     if (frame.cloud->organised()) {
-        if (const double middle = middle_z(*frame.cloud); is_image_in_millimetres(*frame.cloud, middle))
+        if (const double middle = middle_depth(*frame.cloud); is_image_in_millimetres(*frame.cloud, middle))
             take_for_millimetres(frame, middle);
     } else if (!capture.camera) {
         see_pixels(frame);
