@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <istream>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>

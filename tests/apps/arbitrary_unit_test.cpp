@@ -1,5 +1,6 @@
 // Recordings in an arbitrary unit, from end to end: nothing calls it metres, and the unit does not matter.
 #include "io/captures/capture.h"
+#include "io/clouds/cloud_file.h"
 #include "tests/support/colmap_workspace.h"
 #include "tests/support/files.h"
 
@@ -60,10 +61,11 @@ class ArbitraryUnit : public testing::Test {
     /// The mean of the points' absolute coordinates.
     [[nodiscard]] static double size_of(const fs::path& ply) {
         double sum = 0;
-        const Frame frame = open_capture(ply).load(0);
-        for (const Eigen::Vector3d& point : frame.cloud->points)
+        std::vector<std::string> warnings;
+        const Cloud cloud = read_cloud(ply, warnings); // a capture might take its numbers for millimetres
+        for (const Eigen::Vector3d& point : cloud.points)
             sum += point.cwiseAbs().sum();
-        return sum / static_cast<double>(frame.cloud->points.size());
+        return sum / static_cast<double>(cloud.points.size());
     }
     tests::TemporaryFolder folder;
 };

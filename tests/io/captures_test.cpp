@@ -12,7 +12,6 @@
 namespace scanshade {
 namespace {
 
-namespace fs = std::filesystem;
 using namespace tests;
 
 /// The world point that a pixel shows, up to the sign of the world's y.
