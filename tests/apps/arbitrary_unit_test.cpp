@@ -42,7 +42,7 @@ class ArbitraryUnit : public testing::Test {
             GTEST_SKIP() << "no program";
     }
     [[nodiscard]] fs::path workspace(double unit) const {
-        const fs::path path = folder / fmt::format("in-{}-{}", unit, noise);
+        fs::path path = folder / fmt::format("in-{}-{}", unit, noise);
         if (!fs::exists(path))
             write_colmap(path, {.frames = 4, .unit = unit, .noise = noise});
         return path;
