@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdint>
 #include <numbers>
 #include <span>
 #include <vector>
@@ -150,7 +151,11 @@ std::optional<Axis> axis_of(const std::vector<double>& tangents, double pitch) {
 /// Whether hardly two points share a pixel, and most have another beside them.
 bool are_pixels(const Rays& rays, const Axis& u, const Axis& v) {
     constexpr double most_shared = 0.001, fewest_beside = 0.8;
-    std::vector<char> taken(static_cast<std::size_t>(u.pixels) * static_cast<std::size_t>(v.pixels));
+    constexpr std::size_t most_pixels = 50; // per point: an image that is nearly all holes is none
+    const std::size_t pixels = static_cast<std::size_t>(u.pixels) * static_cast<std::size_t>(v.pixels);
+    if (pixels > most_pixels * rays.x.size())
+        return false;
+    std::vector<std::uint32_t> taken(pixels);
     const auto at = [&](std::size_t i) {
         return static_cast<std::size_t>(v.pixel(rays.y[i])) * static_cast<std::size_t>(u.pixels) +
                static_cast<std::size_t>(u.pixel(rays.x[i]));

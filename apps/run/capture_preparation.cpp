@@ -73,11 +73,7 @@ void settle_views(CaptureJob& job, std::span<const DepthImage> seen) {
     if (!no_grid || std::ranges::any_of(seen, [](const DepthImage& view) { return view.z_m.empty(); }))
         return;
     job.as_views = job.batch.noise.any();
-    if (job.as_views)
-        job.capture.warnings.emplace_back(
-            "points seen by one camera at the origin, with a depth sensor's noise: they are "
-            "computed as its image. --clouds points casts rays from every point.");
-    else
+    if (!job.as_views)
         job.batch.noise = {};
 }
 
@@ -97,13 +93,13 @@ void CaptureRuns::look_at(CaptureJob& job) const {
         return;
     const bool colour = shows_colour(job.batch.outputs, !asked_.recording_cloud.empty() || job.batch.outputs.mcap);
     const bool by_points = asked_.clouds != CloudWalk::view && !job.capture.camera;
-    const bool may_be_views = by_points && asked_.clouds == CloudWalk::automatic && measures_noise && !images;
-    const std::vector<DepthImage> seen = first_look(
-        job.capture, job.of, &job.loaded, colour,
-        by_points ? CloudAo(asked_.cloud_ao()).most_at_once() : std::numeric_limits<std::size_t>::max(), may_be_views);
+    const std::vector<DepthImage> seen =
+        first_look(job.capture, job.of, &job.loaded, colour,
+                   by_points ? CloudAo(asked_.cloud_ao()).most_at_once() : std::numeric_limits<std::size_t>::max(),
+                   measures_noise && asked_.clouds != CloudWalk::points);
     if (measures_noise)
         job.batch.noise = measure_noise(seen);
-    if (may_be_views)
+    if (by_points && measures_noise && !images && asked_.clouds == CloudWalk::automatic)
         settle_views(job, seen);
     if (!job.capture.unit.arbitrary())
         job.extent_m = typical_extent(seen);
@@ -121,6 +117,7 @@ CaptureRuns::Prepared CaptureRuns::prepare(CaptureJob& job) {
     const std::lock_guard alone(alone_);
     const bool needs_no_view = asked_.chosen_setup().make_for_points() != nullptr;
     job.batch.cloud_tiles = asked_.cloud_tiles;
+    job.as_views = job.as_views && !needs_no_view;
     job.batch.cloud_walk = needs_no_view ? CloudWalk::points : job.as_views ? CloudWalk::view : asked_.clouds;
     const bool by_points = computes_points(job);
     const bool no_device = by_points && !asked_.asks_for_device(job.capture);
@@ -138,9 +135,16 @@ CaptureRuns::Prepared CaptureRuns::prepare(CaptureJob& job) {
     gpu::Device* gpu = workers && !gpu::is_cpu(workers->device().info()) ? &workers->device() : nullptr;
     auto points = point_method(*setup, asked_.cloud_ao(), gpu);
     job.batch.points = points.get();
+    const auto warn_once = [&](std::string warning) { // for all blocks
+        if (!std::ranges::count(job.capture.warnings, warning))
+            job.capture.warnings.push_back(std::move(warning));
+    };
     if (job.batch.radius_m != asked_.radius_m())
-        if (std::string warning = small_scene_warning(job); !std::ranges::count(job.capture.warnings, warning))
-            job.capture.warnings.push_back(std::move(warning)); // once for all blocks
+        warn_once(small_scene_warning(job));
+    if (job.as_views)
+        warn_once(
+            "points seen by one camera at the origin, with a depth sensor's noise: they are computed as its image. "
+            "--clouds points casts rays from every point.");
     RunReport report = begun_report(job, workers, *setup);
     report.budget = budget;
     const std::string light = take_light(job, report, by_points ? nullptr : methods.get());

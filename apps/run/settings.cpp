@@ -249,7 +249,8 @@ std::vector<Stage> RunSettings::common_stages() {
            .value = OneOf(&s.cloud_tiles, tile_words)},
           {.name = "clouds",
            .help = "points: rays from every point of a cloud; view: the cloud as one camera sees it; auto = points, "
-                   "unless the cloud has a grid or --camera is given",
+                   "unless one depth camera took them or --camera is given; but for --cloud.radius, sky, outside and "
+                   "normals",
            .value = OneOf(&s.clouds, cloud_words)},
           {.name = "sequence",
            .help = "on: frames of a recording with poses are computed together; auto: the same, and no warning where "
@@ -444,6 +445,11 @@ void RunSettings::resolve() {
         throw Misuse("colour: is the colour image of one depth image, and there are several captures");
     if (!depth_scale.empty())
         (void)depth_encoding(depth_scale, "--depth-scale");
+    const CloudAoOptions usual; // what only rays can do is asked of rays
+    if (clouds == CloudWalk::automatic &&
+        (clouds_by_points.radius > 0 || clouds_by_points.sky || clouds_by_points.outside != usual.outside ||
+         clouds_by_points.normals != usual.normals))
+        clouds = CloudWalk::points;
     cloud_options_ = clouds_by_points;
     if (cloud_options_.radius == 0 && radius)
         cloud_options_.radius = *radius;

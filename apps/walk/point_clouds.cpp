@@ -41,19 +41,17 @@ bool is_one_view(const Frame& frame) {
     constexpr std::size_t fewest = 30000;
     constexpr double nearest_m = 0.1, farthest_m = 30;
     const std::vector<Vector3d>& points = frame.cloud->points;
-    if (frame.cloud->organised() || points.size() < fewest || !triangles_of(*frame.cloud).empty())
+    if (frame.cloud->organised() || points.size() < fewest)
         return false;
     if (const double middle = middle_depth(*frame.cloud); middle < nearest_m || middle > farthest_m)
         return false;
-    const NormalOrientation seen = guessed_orientation(points, std::nullopt, false);
-    if (seen.kind != NormalOrientation::Kind::viewpoint || !seen.point.isZero())
-        return false;
     try {
         (void)camera_of(frame);
-        return true;
     } catch (const Error&) {
         return false;
     }
+    const NormalOrientation seen = guessed_orientation(points, std::nullopt, false);
+    return seen.kind == NormalOrientation::Kind::viewpoint && seen.point.isZero() && triangles_of(*frame.cloud).empty();
 }
 
 std::optional<Vector3d> scanner_of(const Frame& frame) {

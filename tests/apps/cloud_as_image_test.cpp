@@ -41,6 +41,8 @@ TEST_F(CloudAsImage, has_the_camera_and_noise_of_the_frame_it_was) {
     EXPECT_NE(told.out.find("the pixels of one image"), std::string::npos) << told.out;
     const auto by_rays = run_program(fmt::format("run {} -o {} --overwrite --clouds points", points, cloud));
     EXPECT_NE(by_rays.err.find("rays from every point"), std::string::npos) << by_rays.err;
+    const auto sky = run_program(fmt::format("run {} -o {} --overwrite --cloud.sky", points, cloud));
+    EXPECT_NE(sky.err.find("rays from every point"), std::string::npos) << "an image has no sky: " << sky.err;
 }
 
 TEST_F(CloudAsImage, may_be_a_part_of_a_noisy_frame_in_any_order) {
@@ -72,6 +74,7 @@ TEST_F(CloudAsImage, may_be_a_part_of_a_noisy_frame_in_any_order) {
     EXPECT_NEAR(found, expected, 0.02);
     EXPECT_NE(told.find("points seen by one camera"), std::string::npos) << told;
     EXPECT_EQ(mean_of("--clouds points").second.find("points seen by one camera"), std::string::npos);
+    EXPECT_EQ(mean_of("--clouds view").first, found) << "the noise is measured there, too";
 }
 
 } // namespace
