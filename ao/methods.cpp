@@ -72,7 +72,7 @@ const std::vector<MethodRow>& methods() {
          "Crassin et al. 2011; VXAO (NVIDIA 2016)", SetupOf<VxaoOptions, Vxao>::start},
         {"raycast",
          "rays against the depth surface, the cloud's discs or the mesh itself; on the CPU, with standard errors",
-         "cosine-weighted ambient occlusion by its definition; Embree 3", SetupOf<RaycastOptions, Raycast>::start},
+         "cosine-weighted ambient occlusion by its definition; Embree", SetupOf<RaycastOptions, Raycast>::start},
     };
     return table;
 }

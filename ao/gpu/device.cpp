@@ -32,9 +32,14 @@ VKAPI_ATTR VkBool32 VKAPI_CALL keep_message(VkDebugUtilsMessageSeverityFlagBitsE
 }
 
 vk::DebugUtilsMessengerCreateInfoEXT messenger_info(Messages* messages) {
-    using Severity = vk::DebugUtilsMessageSeverityFlagBitsEXT;
-    using Type = vk::DebugUtilsMessageTypeFlagBitsEXT;
-    return {{}, Severity::eError | Severity::eWarning, Type::eValidation | Type::ePerformance, keep_message, messages};
+    VkDebugUtilsMessengerCreateInfoEXT info{}; // its C++ counterpart takes callbacks of another type since Vulkan 1.4
+    info.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT;
+    info.messageSeverity =
+        VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT;
+    info.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_PERFORMANCE_BIT_EXT;
+    info.pfnUserCallback = keep_message;
+    info.pUserData = messages;
+    return info;
 }
 
 /// The instance, with validation and synchronization validation where SCANSHADE_VALIDATE asks and the layer is

@@ -56,10 +56,10 @@ namespace {
 
 /// The start of a cast; Embree passes it to the filter.
 struct CastContext {
-    RTCIntersectContext embree;
+    EmbreeContext embree;
     OwnSurface own;
 
-    explicit CastContext(const OwnSurface& own_surface) : own(own_surface) { rtcInitIntersectContext(&embree); }
+    explicit CastContext(const OwnSurface& own_surface) : own(own_surface) { init(embree); }
 };
 static_assert(offsetof(CastContext, embree) == 0, "Embree's pointer to its context is a pointer to ours");
 
@@ -225,7 +225,7 @@ std::optional<RaySurface::Hit> RaySurface::nearest(const Vector3d& origin, const
                            std::numeric_limits<float>::infinity());
     sought.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     CastContext context({});
-    rtcIntersect1(tree_->scene, &context.embree, &sought);
+    intersect(tree_->scene, context.embree, sought);
     if (sought.hit.geomID == RTC_INVALID_GEOMETRY_ID)
         return std::nullopt;
     return Hit{sought.ray.tfar, tree_->index[sought.hit.primID]};
@@ -237,7 +237,7 @@ bool RaySurface::blocked(const Vector3d& from, const Vector3d& to) const {
         return false;
     RTCRay ray = ray_along(local(from), (to - from).cast<float>(), clear_of_ends, 1 - clear_of_ends);
     CastContext context({});
-    rtcOccluded1(tree_->scene, &context.embree, &ray);
+    occluded(tree_->scene, context.embree, ray);
     return ray.tfar < 0;
 }
 
@@ -247,7 +247,7 @@ void RaySurface::drop_blocked(RayBundle& bundle) const {
     RTCRay8 rays;
     fill(rays, bundle);
     CastContext context(bundle.own);
-    rtcOccluded8(bundle.live.data(), tree_->scene, &context.embree, &rays);
+    occluded(bundle.live.data(), tree_->scene, context.embree, rays);
     for (int i = 0; i < RayBundle::size; ++i)
         if (rays.tfar[i] < 0)
             bundle.live[i] = 0;
@@ -263,7 +263,7 @@ RaySurface::Hits RaySurface::hits(const RayBundle& bundle) const {
     fill(sought.ray, bundle);
     std::fill(std::begin(sought.hit.geomID), std::end(sought.hit.geomID), RTC_INVALID_GEOMETRY_ID);
     CastContext context(bundle.own);
-    rtcIntersect8(bundle.live.data(), tree_->scene, &context.embree, &sought);
+    intersect(bundle.live.data(), tree_->scene, context.embree, sought);
     for (std::size_t i = 0; i < RayBundle::size; ++i)
         if (bundle.live[i] && sought.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) {
             found.distance[i] = sought.ray.tfar[i];

@@ -47,8 +47,21 @@ install(CODE [[
     file(GET_RUNTIME_DEPENDENCIES EXECUTABLES $<TARGET_FILE:scanshade> LIBRARIES $<TARGET_FILE:library>
          RESOLVED_DEPENDENCIES_VAR needed POST_EXCLUDE_REGEXES
          "/(ld-linux[^/]*|libc|libm|libdl|libpthread|librt|libstdc\\+\\+|libgcc_s|libscanshade)\\.so[^/]*$")
-    file(INSTALL ${needed} $<TARGET_FILE:Vulkan::Vulkan>
-         DESTINATION $ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/lib/scanshade FOLLOW_SYMLINK_CHAIN)
+    list(APPEND needed $<TARGET_FILE:Vulkan::Vulkan>)
+    file(INSTALL ${needed} DESTINATION $ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/lib/scanshade FOLLOW_SYMLINK_CHAIN)
+    # With the terms of each, as its Debian package states them.
+    set(terms $ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/share/doc/scanshade/libraries)
+    file(MAKE_DIRECTORY ${terms})
+    foreach(library ${needed})
+      file(REAL_PATH ${library} file)
+      get_filename_component(name ${file} NAME)
+      execute_process(COMMAND dpkg -S */${name} OUTPUT_VARIABLE owner ERROR_QUIET)
+      string(REGEX REPLACE "[:,].*" "" owner "${owner}")
+      if(NOT owner OR NOT EXISTS /usr/share/doc/${owner}/copyright)
+        message(FATAL_ERROR "no terms found of ${library}")
+      endif()
+      file(COPY_FILE /usr/share/doc/${owner}/copyright ${terms}/${owner}.txt)
+    endforeach()
   endif()
 ]] COMPONENT carried)
 

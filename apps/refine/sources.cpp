@@ -83,6 +83,20 @@ std::string text_of(const Target& target) {
                        target.count.width, target.count.height, 1000 * target.square_m);
 }
 
+struct FlawText {
+    std::string what, advice;
+};
+
+FlawText flaw_of(BoardView::Flaw flaw, const Target& target) {
+    if (flaw == BoardView::Flaw::larger)
+        return {fmt::format("is larger than {}x{} corners", target.count.width, target.count.height),
+                "--board takes all inner corners, those at which four squares meet"};
+    return {fmt::format("has other squares than a ChArUco board of {}x{}", target.count.width, target.count.height),
+            "--board takes all squares, columns x rows; boards with an even number of rows that were printed before "
+            "OpenCV 4.6 "
+            "are read where the program is built with OpenCV 4.7 or later (this is " CV_VERSION ")"};
+}
+
 } // namespace
 
 std::optional<Camera> given_camera(const std::string& text, double fov_degrees, LensModel lens, cv::Size size) {
@@ -118,25 +132,24 @@ Refinement refine_from_boards(const fs::path& folder, const Target& target, cons
     const std::vector<Picture> pictures = pictures_in(folder, notes);
     const cv::Size size = pictures.front().pixels.size();
     std::vector<BoardView> views;
-    std::size_t larger = 0;
+    std::map<BoardView::Flaw, std::size_t> flawed;
     for (const Picture& picture : pictures) {
         auto view = find_board(picture.pixels, target, picture.name);
         const std::string file = (folder / picture.name).string();
         if (!view) {
             notes.push_back(fmt::format("no board found in {}; not used.", file));
-        } else if (view->goes_on) {
-            ++larger;
-            notes.push_back(fmt::format("the board in {} is larger than {}x{} corners; not used.", file,
-                                        target.count.width, target.count.height));
+        } else if (view->flaw != BoardView::Flaw::none) {
+            ++flawed[view->flaw];
+            notes.push_back(fmt::format("the board in {} {}; not used.", file, flaw_of(view->flaw, target).what));
         } else {
             views.push_back(*std::move(view));
         }
     }
-    if (larger > 0 && larger >= views.size())
-        throw Error(fmt::format("{}: the board is larger than {}x{} corners in {} of the {} pictures where one is "
-                                "found; --board takes all inner corners, those at which four squares meet",
-                                folder.string(), target.count.width, target.count.height, larger,
-                                larger + views.size()));
+    for (const auto& [flaw, count] : flawed)
+        if (count >= views.size())
+            throw Error(fmt::format("{}: the board {} in {} of the {} pictures where one is found; {}", folder.string(),
+                                    flaw_of(flaw, target).what, count, count + views.size(),
+                                    flaw_of(flaw, target).advice));
     if (views.empty())
         throw Error(
             fmt::format("{}: no {} found in any of {} pictures", folder.string(), text_of(target), pictures.size()));

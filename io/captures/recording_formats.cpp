@@ -9,7 +9,7 @@ namespace scanshade {
 
 namespace {
 
-constexpr RecordingFormat formats[] = {
+constexpr RecordingFormat recordings[] = {
     {.name = "nerfstudio / instant-ngp",
      .recognised = "`transforms.json`",
      .depth = "as it says; 16-bit PNG in mm, `.npy`",
@@ -191,6 +191,6 @@ constexpr RecordingFormat formats[] = {
 
 } // namespace
 
-std::span<const RecordingFormat> recording_formats() { return formats; }
+std::span<const RecordingFormat> recording_formats() { return recordings; }
 
 } // namespace scanshade

@@ -19,7 +19,7 @@ namespace {
 constexpr std::uint64_t most_members = 1 << 22, member_header = 30, directory_row = 46, end_record = 22,
                         end_locator = 20, end_record_64 = 56, longest_comment = 1 << 16;
 constexpr std::uint32_t in_zip64 = 0xffffffff;
-enum Method : std::uint16_t { stored = 0, deflated = 8 };
+enum Method : std::uint16_t { stored = 0, by_deflate = 8 };
 enum Flag : std::uint16_t { encrypted = 1, sizes_follow = 8 };
 
 template <class Number>
@@ -163,7 +163,7 @@ std::string ZipArchive::where(const ZipMember& member) const {
 std::uint64_t ZipArchive::data_at(const ZipMember& member) const {
     if (member.flags & encrypted)
         throw Error(where(member) + ": encrypted, expected a member that is not");
-    if (member.method != stored && member.method != deflated)
+    if (member.method != stored && member.method != by_deflate)
         throw Error(
             fmt::format("{}: packed by method {}, expected 0 (stored) or 8 (deflated)", where(member), member.method));
     if (file_.size() < member_header || member.header_at > file_.size() - member_header)
@@ -186,7 +186,7 @@ std::string ZipArchive::bytes(const ZipMember& member, std::uint64_t most) const
     if (member.bytes > most)
         throw Error(fmt::format("{}: {}, expected at most {}", where(member), counted(member.bytes, "byte"), most));
     std::string all = file_.bytes(data_at(member), member.packed_bytes);
-    if (member.method == deflated)
+    if (member.method == by_deflate)
         all = during(where(member), [&] { return inflated(all, Inflate::raw, member.bytes); });
     if (all.size() != member.bytes)
         throw Error(fmt::format("{}: {}, expected {}", where(member), counted(all.size(), "byte"), member.bytes));

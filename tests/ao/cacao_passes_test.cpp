@@ -40,7 +40,7 @@ TEST_F(cacao_passes, every_configuration_is_sound) {
 TEST_F(cacao_passes, odd_and_tiny_images_run_without_a_word_of_validation) {
     // Out-of-range accesses and missing barriers show at sizes that no tile divides. TearDown reads the messages.
     if (!device().validating())
-        GTEST_SKIP() << "the validation layer is not installed";
+        GTEST_SKIP() << "the validation layer is not there; tests/run installs it";
     const std::vector<std::pair<Quality, bool>> modes{
         {Quality::highest, true},  {Quality::lowest, true}, {Quality::high, false},   {Quality::medium, true},
         {Quality::highest, false}, {Quality::low, true},    {Quality::lowest, false}, {Quality::high, true}};

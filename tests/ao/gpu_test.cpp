@@ -69,7 +69,7 @@ TEST(gpu, passes_wait_for_those_that_read_or_write_before_them) {
     // One after the other: read after write, write after read, write after write, a cleared buffer that is read.
     ASSERT_TRUE(validated);
     if (!gpu::Device().validating())
-        GTEST_SKIP() << "the validation layer is not installed";
+        GTEST_SKIP() << "the validation layer is not there; tests/run installs it";
     const std::vector<BufferRow> buffers{words("in", Host::upload), words("a"), words("b"),
                                          words("out", Host::download)};
     const PassRow clear_a{"clear", "", {}, {1}, {1, 1, 1}, {}};
@@ -194,7 +194,7 @@ TEST(gpu, validation_reports_a_wrong_program) {
     // More work groups than any device allows, recorded but never run: the layer must report it, or it is not active.
     gpu::Device device;
     if (!device.validating())
-        GTEST_SKIP() << "the validation layer is not installed";
+        GTEST_SKIP() << "the validation layer is not there; tests/run installs it";
     PassRow vast = add_one(0, 1);
     vast.groups = {1, 1U << 31, 1};
     const gpu::Program program(device, {words("in", Host::upload), words("out", Host::download)}, {vast}, 4);

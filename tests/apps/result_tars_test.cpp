@@ -136,7 +136,7 @@ print(len(seen))
 
 TEST_F(ResultTarsTest, pythons_tarfile_groups_them_into_samples) {
     if (std::system("python3 -c '' 2>/dev/null") != 0)
-        GTEST_SKIP() << "no python3";
+        GTEST_SKIP() << "python3 is not there; tests/run installs it";
     record(5);
     fs::rename(folder / "capture/depth/004.png", folder / "capture/depth/004.5.png"); // a dot in a name
     fs::rename(folder / "capture/color/004.png", folder / "capture/color/004.5.png");

@@ -7,10 +7,16 @@
 #include <array>
 #include <cmath>
 #include <gtest/gtest.h>
-#include <opencv2/aruco/charuco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
+
+#include <opencv2/core/version.hpp>
+#if CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR < 7
+#include <opencv2/aruco.hpp>
+#else
+#include <opencv2/objdetect/aruco_dictionary.hpp>
+#endif
 
 namespace scanshade {
 namespace {
@@ -73,20 +79,83 @@ TEST(Targets, CirclesOfBothLayoutsAreFoundWhereTheyAre) {
     }
 }
 
+/// A ChArUco board of the dictionary 4x4_50, its markers three quarters of a square, in the white squares row by row.
+/// Boards of the older pattern, from before OpenCV 4.6, have a white first square where the number of rows is even.
+cv::Mat1b charuco_pattern(cv::Size squares, bool older, int px_per_square = 100) {
+    const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50);
+    const int white = older && squares.height % 2 == 0 ? 0 : 1, side = px_per_square * 3 / 4,
+              rim = (px_per_square - side) / 2;
+    cv::Mat1b pattern(px_per_square * squares, uchar(0));
+    for (int row = 0, marker = 0; row < squares.height; ++row)
+        for (int column = 0; column < squares.width; ++column)
+            if ((row + column) % 2 == white) {
+                cv::Mat1b square =
+                    pattern(cv::Rect(column * px_per_square, row * px_per_square, px_per_square, px_per_square));
+                square.setTo(255);
+                cv::Mat1b drawn;
+#if CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR < 7
+                cv::aruco::drawMarker(dictionary, marker++, side, drawn);
+#else
+                cv::aruco::generateImageMarker(dictionary, marker++, side, drawn);
+#endif
+                drawn.copyTo(square(cv::Rect(rim, rim, side, side)));
+            }
+    return pattern;
+}
+
+constexpr double charuco_m_per_px = 0.0004, charuco_pose[6] = {0.2, 0.1, 0, -0.13, -0.1, 0.4};
+
+cv::Mat3b seen_charuco(cv::Size squares, bool older, const Pinhole& camera) {
+    return seen(charuco_pattern(squares, older), charuco_m_per_px, charuco_pose, camera);
+}
+
+/// Root mean square distance between the corners found and where they truly are, pixels. Pattern pixels are centred at
+/// integers, so the board's corner lies half a pixel outside the first one.
+double charuco_error_px(const BoardView& view, const Model& model) {
+    double squares = 0;
+    for (std::size_t i = 0; i < view.pixels.size(); ++i) {
+        const Eigen::Vector3d at = view.points_m[i] - Eigen::Vector3d(0.5, 0.5, 0) * charuco_m_per_px;
+        Eigen::Vector3d point;
+        Eigen::Vector2d truth;
+        transform_point(charuco_pose, at.data(), point.data());
+        pixel_of(model.lens, model.values.data(), point.data(), truth.data());
+        squares += (truth - view.pixels[i]).squaredNorm();
+    }
+    return std::sqrt(squares / static_cast<double>(view.pixels.size()));
+}
+
 TEST(Targets, ACharucoBoardIsFoundThoughPartOfItIsCovered) {
     const Target target{Target::Kind::charuco, {7, 5}, 0.04, 0.03, "4x4_50"};
-    const auto board = cv::aruco::CharucoBoard::create(7, 5, 0.04F, 0.03F, cv::aruco::getPredefinedDictionary(0));
-    cv::Mat1b pattern;
-    board->draw({700, 500}, pattern);
-    const double m_per_px = 0.0004, pose[6] = {0.2, 0.1, 0, -0.13, -0.1, 0.4};
-    cv::Mat3b picture = seen(pattern, m_per_px, pose, plain.pinhole);
+    cv::Mat3b picture = seen_charuco(target.count, false, plain.pinhole);
     const auto whole = find_board(picture, target, "charuco");
     ASSERT_TRUE(whole);
     EXPECT_EQ(whole->pixels.size(), 24);
+    EXPECT_EQ(whole->flaw, BoardView::Flaw::none);
+    EXPECT_LT(charuco_error_px(*whole, model_of(plain)), 0.2);
     picture(cv::Rect(0, 0, 300, 480)).setTo(255);
     const auto part = find_board(picture, target, "charuco");
     ASSERT_TRUE(part);
     EXPECT_LT(part->pixels.size(), 24);
+    EXPECT_EQ(part->flaw, BoardView::Flaw::none);
+}
+
+TEST(Targets, ACharucoBoardOfTheOlderPatternIsReadOrRefusedButNeverMisplaced) {
+    const bool reads_it = CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7;
+    for (const cv::Size squares : {cv::Size(7, 6), cv::Size(8, 6), cv::Size(8, 5), cv::Size(5, 8)})
+        for (const bool older : {false, true}) {
+            SCOPED_TRACE(fmt::format("{}x{}, {}", squares.width, squares.height, older ? "older" : "today's"));
+            const Target target{Target::Kind::charuco, squares, 0.04, 0.03, "4x4_50"};
+            const auto view = find_board(seen_charuco(squares, older, plain.pinhole), target, "charuco");
+            const bool differs = older && squares.height % 2 == 0;
+            if (differs && !reads_it) {
+                EXPECT_TRUE(!view || view->flaw == BoardView::Flaw::uneven);
+            } else {
+                ASSERT_TRUE(view);
+                EXPECT_EQ(view->flaw, BoardView::Flaw::none);
+                EXPECT_EQ(view->pixels.size(), static_cast<std::size_t>((squares.width - 1) * (squares.height - 1)));
+                EXPECT_LT(charuco_error_px(*view, model_of(plain)), 0.2);
+            }
+        }
 }
 
 /// A chessboard of 9x6 inner corners in a picture, and where its corners truly are. `outer` is how much of the
@@ -184,7 +253,7 @@ TEST(Targets, ChessboardCornersAreNearerToTruthThanWithOneWindowForAll) {
             if (!view)
                 continue;
             ++found;
-            EXPECT_FALSE(view->goes_on) << c.name;
+            EXPECT_EQ(view->flaw, BoardView::Flaw::none) << c.name;
             std::vector<cv::Point2d> corners;
             for (const Eigen::Vector2d& pixel : view->pixels)
                 corners.emplace_back(pixel.x(), pixel.y());
@@ -208,11 +277,11 @@ TEST(Targets, ABoardLargerThanToldIsNoticed) {
         const SeenChessboard seen = chessboard_at(pose.data(), -0.1, 1, 0.7, 2, random);
         if (const auto part = find_board(seen.picture, {.count = {8, 6}}, "part")) {
             ++found;
-            EXPECT_TRUE(part->goes_on);
+            EXPECT_EQ(part->flaw, BoardView::Flaw::larger);
         }
         const auto whole = find_board(seen.picture, {}, "whole");
         ASSERT_TRUE(whole);
-        EXPECT_FALSE(whole->goes_on);
+        EXPECT_EQ(whole->flaw, BoardView::Flaw::none);
     }
     EXPECT_GT(found, 0);
 }

@@ -11,6 +11,7 @@
 #include "projection/base/stopwatch.h"
 #include "projection/expected_error.h"
 #include "tests/gauntlet/perturb.h"
+#include "tests/support/data.h"
 
 #include <algorithm>
 #include <cmath>
@@ -261,8 +262,7 @@ void run_real(Gauntlet& gauntlet, const fs::path& data) {
 int main(int count, char** arguments) {
     using namespace scanshade::gauntlet;
     Gauntlet gauntlet({arguments + 1, arguments + count});
-    const char* data = std::getenv("SCANSHADE_DATA");
     run_generated(gauntlet);
-    run_real(gauntlet, data ? data : SCANSHADE_SOURCE "/../shared/data");
+    run_real(gauntlet, tests::data_folder());
     return gauntlet.silently_wrong() ? 1 : 0;
 }

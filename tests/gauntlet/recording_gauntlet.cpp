@@ -5,6 +5,7 @@
 #include "projection/base/stopwatch.h"
 #include "projection/project.h"
 #include "tests/gauntlet/perturb_recordings.h"
+#include "tests/support/data.h"
 
 #include <algorithm>
 #include <cmath>
@@ -410,8 +411,7 @@ int main(int count, char** arguments) {
     using namespace scanshade::gauntlet;
     const scanshade::Stopwatch stopwatch;
     Gauntlet gauntlet({arguments + 1, arguments + count});
-    const char* data = std::getenv("SCANSHADE_DATA");
-    const std::filesystem::path folder = data ? data : SCANSHADE_SOURCE "/../shared/data";
+    const std::filesystem::path folder = tests::data_folder();
     for (const char* sensor : {"ideal", "kinect", "tof"})
         run_generated(gauntlet, sensor, true);
     run_generated(gauntlet, "kinect", false);

@@ -2,6 +2,7 @@
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "io/clouds/e57/e57.h"
+#include "tests/support/data.h"
 #include "tests/support/e57_file.h"
 #include "tests/support/files.h"
 
@@ -265,10 +266,8 @@ TEST(E57, any_changed_byte_under_a_sound_checksum_is_read_or_refused) {
 }
 
 TEST(E57, a_recorded_cloud_has_the_known_sums) {
-    const char* data = std::getenv("SCANSHADE_DATA");
-    const fs::path folder = fs::path(data ? data : "") / "e57";
-    if (!data || !fs::exists(folder / "bunnyInt32.e57"))
-        GTEST_SKIP() << "no recorded E57; SCANSHADE_DATA names the folder of recorded data";
+    const fs::path folder = tests::data_folder() / "e57";
+    NEEDS(folder / "bunnyInt32.e57");
     const Cloud cloud = read(folder / "bunnyInt32.e57");
     ASSERT_EQ(cloud.points.size(), 30571U);
     Eigen::Vector3d sum = Eigen::Vector3d::Zero(), low = cloud.points[0], high = low;

@@ -29,7 +29,7 @@ class ReadersTest : public testing::Test {
             if (!fs::exists(modules() / package))
                 GTEST_SKIP() << package << " is not in " << modules().string() << "; tests/run installs it";
         if (std::system("node --version >/dev/null 2>&1") != 0)
-            GTEST_SKIP() << "node is not there";
+            GTEST_SKIP() << "node is not there; tests/run installs it";
     }
 
     static fs::path modules() { return fs::path(SCANSHADE_PROGRAM).parent_path() / "readers/node_modules"; }

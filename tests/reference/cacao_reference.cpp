@@ -1,7 +1,7 @@
 // cacao_reference: runs the `reference` profile over a folder of AMD's own CACAO outputs and says how equal we are.
 //   cacao_reference [FOLDER] [--intermediates] [--only TEXT]      FOLDER holds manifest.json, inputs/, outputs/
-// Without FOLDER: SCANSHADE_FIXTURES, else ../shared/fixtures/cacao beside the source tree. Exit 0 all cases within the
-// contract, 1 a case misses or fails to run, 2 manifest unreadable, 77 no folder.
+// Without FOLDER: SCANSHADE_FIXTURES. Exit 0 all cases within the contract, 1 a case misses or fails to run, 2 manifest
+// unreadable, 77 no folder.
 #include "ao/cacao/cacao.h"
 #include "ao/gpu/device.h"
 #include "projection/base/error.h"
@@ -158,9 +158,8 @@ void compare_intermediates(const fs::path& folder, const json& row, Cacao& metho
 }
 
 std::string default_folder() {
-    if (const char* set = std::getenv("SCANSHADE_FIXTURES"))
-        return set;
-    return SCANSHADE_SOURCE "/../shared/fixtures/cacao";
+    const char* set = std::getenv("SCANSHADE_FIXTURES");
+    return set ? set : "SCANSHADE_FIXTURES is not set";
 }
 
 int check(const fs::path& folder, bool with_intermediates, const std::string& only) {
@@ -223,7 +222,8 @@ int main(int argc, char** argv) {
     if (folder.empty())
         folder = default_folder();
     if (!fs::exists(fs::path(folder) / "manifest.json")) {
-        fmt::print("skipped: no manifest.json in {}\n", folder);
+        fmt::print("skipped: no manifest.json in {}; SCANSHADE_FIXTURES names the folder of recorded outputs\n",
+                   folder);
         return 77;
     }
     try {

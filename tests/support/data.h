@@ -10,7 +10,7 @@ namespace scanshade::tests {
 /// The folder with recorded and damaged data; the tests that need it are skipped where it is not.
 inline std::filesystem::path data_folder() {
     const char* named = std::getenv("SCANSHADE_DATA");
-    return named ? std::filesystem::path(named) : std::filesystem::path(SCANSHADE_SOURCE) / "../shared/data";
+    return named && *named ? std::filesystem::path(named) : std::filesystem::path("SCANSHADE_DATA is not set");
 }
 
 } // namespace scanshade::tests

@@ -3,13 +3,13 @@
 
 #include "projection/base/error.h"
 #include "projection/base/statistics.h"
+#include "projection/calibration/boards/charuco.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <opencv2/aruco/charuco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -19,7 +19,7 @@ namespace {
 
 std::vector<std::pair<std::string, int>> dictionaries() {
     std::vector<std::pair<std::string, int>> all;
-    int index = cv::aruco::DICT_4X4_50; // the enumeration runs in this order
+    int index = 0; // OpenCV's enumeration runs in this order
     for (const char* bits : {"4x4", "5x5", "6x6", "7x7"})
         for (const int count : {50, 100, 250, 1000})
             all.emplace_back(fmt::format("{}_{}", bits, count), index++);
@@ -155,7 +155,8 @@ std::optional<BoardView> find_chessboard(const cv::Mat1b& grey, const Target& ta
         return std::nullopt;
     refine_corners(grey, corners, target.count);
     BoardView view = view_of(corners, target, name);
-    view.goes_on = goes_on(grey, corners, target.count);
+    if (goes_on(grey, corners, target.count))
+        view.flaw = BoardView::Flaw::larger;
     return view;
 }
 
@@ -173,22 +174,19 @@ std::optional<BoardView> find_charuco(const cv::Mat1b& grey, const Target& targe
     constexpr std::size_t least_corners = 8;
     const auto square = static_cast<float>(target.square_m);
     const auto marker = target.marker_m > 0 ? static_cast<float>(target.marker_m) : 0.75F * square;
-    const auto dictionary = cv::aruco::getPredefinedDictionary(dictionary_named(target.dictionary));
-    const auto board =
-        cv::aruco::CharucoBoard::create(target.count.width, target.count.height, square, marker, dictionary);
-    std::vector<std::vector<cv::Point2f>> markers;
-    std::vector<int> ids, corner_ids;
-    cv::aruco::detectMarkers(grey, dictionary, markers, ids);
-    std::vector<cv::Point2f> corners;
-    if (ids.empty() || cv::aruco::interpolateCornersCharuco(markers, ids, grey, board, corners, corner_ids) <= 0)
+    const CharucoCorners found =
+        find_charuco_corners(grey, {target.count, square, marker, dictionary_named(target.dictionary)});
+    if (found.ids.size() < least_corners)
         return std::nullopt;
     BoardView view{name, {}, {}};
-    for (std::size_t i = 0; i < corners.size(); ++i) {
-        const cv::Point3f point = board->chessboardCorners[corner_ids[i]];
-        view.points_m.emplace_back(point.x, point.y, 0);
-        view.pixels.emplace_back(corners[i].x, corners[i].y);
+    for (std::size_t i = 0; i < found.ids.size(); ++i) {
+        const int columns = target.count.width - 1, column = found.ids[i] % columns, row = found.ids[i] / columns;
+        view.points_m.emplace_back((column + 1) * target.square_m, (row + 1) * target.square_m, 0);
+        view.pixels.emplace_back(found.pixels[i].x, found.pixels[i].y);
     }
-    return corners.size() >= least_corners ? std::optional(view) : std::nullopt;
+    if (found.unevenness > most_unevenness)
+        view.flaw = BoardView::Flaw::uneven;
+    return view;
 }
 
 } // namespace

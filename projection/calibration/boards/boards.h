@@ -10,7 +10,11 @@ struct BoardView {
     std::string name;
     std::vector<Eigen::Vector3d> points_m;
     std::vector<Eigen::Vector2d> pixels;
-    bool goes_on = false; ///< it is part of a larger chessboard than was looked for
+    enum class Flaw {
+        none,
+        larger, ///< it is part of a larger chessboard than was looked for
+        uneven, ///< its corners are not evenly spaced, as those of a ChArUco board of another pattern
+    } flaw = Flaw::none;
 };
 
 class Boards final : public Problem {
