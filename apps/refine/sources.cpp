@@ -91,10 +91,10 @@ FlawText flaw_of(BoardView::Flaw flaw, const Target& target) {
     if (flaw == BoardView::Flaw::larger)
         return {fmt::format("is larger than {}x{} corners", target.count.width, target.count.height),
                 "--board takes all inner corners, those at which four squares meet"};
-    return {fmt::format("has other squares than a ChArUco board of {}x{}", target.count.width, target.count.height),
-            "--board takes all squares, columns x rows; boards with an even number of rows that were printed before "
-            "OpenCV 4.6 "
-            "are read where the program is built with OpenCV 4.7 or later (this is " CV_VERSION ")"};
+    return {"has the ChArUco pattern from before OpenCV 4.6",
+            "a program built with OpenCV 4.7 or later reads it (this is " CV_VERSION
+            "), and boards with an odd number of "
+            "rows have one pattern only"};
 }
 
 } // namespace

@@ -184,8 +184,8 @@ std::optional<BoardView> find_charuco(const cv::Mat1b& grey, const Target& targe
         view.points_m.emplace_back((column + 1) * target.square_m, (row + 1) * target.square_m, 0);
         view.pixels.emplace_back(found.pixels[i].x, found.pixels[i].y);
     }
-    if (found.unevenness > most_unevenness)
-        view.flaw = BoardView::Flaw::uneven;
+    if (found.older_pattern)
+        view.flaw = BoardView::Flaw::older_pattern;
     return view;
 }
 

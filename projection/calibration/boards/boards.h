@@ -12,8 +12,8 @@ struct BoardView {
     std::vector<Eigen::Vector2d> pixels;
     enum class Flaw {
         none,
-        larger, ///< it is part of a larger chessboard than was looked for
-        uneven, ///< its corners are not evenly spaced, as those of a ChArUco board of another pattern
+        larger,        ///< it is part of a larger chessboard than was looked for
+        older_pattern, ///< it is a ChArUco board from before OpenCV 4.6, whose corners this build misplaces
     } flaw = Flaw::none;
 };
 

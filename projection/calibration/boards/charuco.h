@@ -6,7 +6,8 @@
 
 namespace scanshade::calibration {
 
-/// Squares across and down, lengths in metres, and OpenCV's number of the dictionary (DICT_4X4_50 is 0, in its enumeration's order).
+/// Squares across and down, lengths in metres, and OpenCV's number of the dictionary (DICT_4X4_50 is 0, in its
+/// enumeration's order).
 struct CharucoLayout {
     cv::Size squares;
     float square_m = 0, marker_m = 0;
@@ -17,15 +18,14 @@ struct CharucoLayout {
 struct CharucoCorners {
     std::vector<cv::Point2f> pixels;
     std::vector<int> ids;
-    /// The median distance of a corner to the middle of its two neighbours in a row or column, in spacings. Perspective and lenses
-    /// leave below 0.1, a board of another pattern than the layout's more than 0.4 (board_detection_test). 0 where none has two.
-    double unevenness = 0;
+    bool older_pattern =
+        false; ///< the markers are where boards from before OpenCV 4.6 have them, and the corners may be misplaced
 };
-inline constexpr double most_unevenness = 0.2;
 
-/// Boards with an even number of rows were printed with the other colour in the first square before OpenCV 4.6. OpenCV 4.7 and
-/// later find both patterns; 4.6 misplaces the corners of the older one, which their unevenness shows. No corners where no board is
-/// seen. Throws Misuse where this build has no ChArUco.
+/// Boards with an even number of rows had the other colour in the first square before OpenCV 4.6. Which pattern a
+/// picture shows is decided by where its markers are. OpenCV 4.7 and later read both patterns; 4.6 misplaces the
+/// corners of the older one, and `older_pattern` says so. No corners where no board is seen. Throws Misuse where this
+/// build has no ChArUco.
 [[nodiscard]] CharucoCorners find_charuco_corners(const cv::Mat1b& grey, const CharucoLayout& layout);
 
 } // namespace scanshade::calibration
