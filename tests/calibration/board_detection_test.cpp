@@ -101,6 +101,8 @@ cv::Mat1b charuco_pattern(cv::Size squares, bool older, int px_per_square = 100)
 #endif
                 drawn.copyTo(square(cv::Rect(rim, rim, side, side)));
             }
+    cv::GaussianBlur(pattern, pattern, {},
+                     1.2); // a picture has about half as many pixels: without this its edges are stairs
     return pattern;
 }
 
