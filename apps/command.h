@@ -14,10 +14,10 @@ namespace scanshade {
 enum ExitCode : int {
     all_well = 0,
     misuse = 1,
-    some_failed = 2,    ///< some frames' input is bad or their result doubtful, the others are done. Trying again will
-                        ///< not help
-    nothing_done = 3,   ///< nothing could be done
-    unfinished = 4,     ///< interrupted, a device lost, a disk or memory full, a share gone: --resume continues
+    some_failed = 2,  ///< some frames' input is bad (with --strict: or a result doubtful), the others are done. Trying
+                      ///< again will not help
+    nothing_done = 3, ///< nothing could be done
+    unfinished = 4,   ///< interrupted, a device lost, a disk or memory full, a share gone: --resume continues
     internal_error = 5, ///< an error in the program, or a frame that crashed it
 };
 

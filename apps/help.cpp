@@ -21,7 +21,8 @@ namespace {
 constexpr std::array exit_codes = {
     std::pair(all_well, "all well"),
     std::pair(misuse, "misuse"),
-    std::pair(some_failed, "some frames' input is bad or their result doubtful, the others are done"),
+    std::pair(some_failed,
+              "some frames' input is bad, the others are done; with --strict also: some results are doubtful"),
     std::pair(nothing_done, "nothing could be done"),
     std::pair(unfinished, "interrupted, device lost, disk or memory full, share gone: `run --resume` goes on"),
     std::pair(internal_error, "internal error"),

@@ -24,16 +24,12 @@ std::string told_sides(const SettledSides& sides, bool recorded) {
 }
 
 ToldError told_error(double error, double by_check) {
-    constexpr double largest_error = 0.12;
     constexpr double largest_by_check = 0.22; // noise alone makes up to 0.2 of what errs by less than 0.1
-    constexpr const char* way_out = "A larger --radius spans more points; ao_confidence tells where.";
     ToldError told{fmt::format("an error of {:.2f} RMS is expected (--write error: of every point).", error), {}};
-    if (error > largest_error)
-        told.doubt = fmt::format("an error of {:.2f} RMS is expected. {}", error, way_out);
-    else if (by_check > largest_by_check)
+    if (by_check > largest_by_check)
         told.doubt = fmt::format("a part of the points by themselves give quite other values, as if the error were "
-                                 "{:.2f} RMS. {}",
-                                 by_check, way_out);
+                                 "{:.2f} RMS; ao_confidence shows where.",
+                                 by_check);
     return told;
 }
 

@@ -20,8 +20,8 @@ struct FittedCounts {
 /// The same about noise; none where no point was moved.
 [[nodiscard]] std::optional<std::string> told_noise(const FittedCounts& fitted);
 
-/// Sentences about the expected error of a cloud, and the error that its check alone lets expect. `doubt` is there if
-/// the first is large, or the other very large.
+/// Sentences about the expected error of a cloud, and a doubt where its check alone lets expect a very large one. A
+/// large expected error is a property of the result, not a doubt.
 struct ToldError {
     std::string note;
     std::optional<std::string> doubt;

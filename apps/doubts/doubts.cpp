@@ -19,7 +19,6 @@ constexpr double least_share = 0.2;        ///< of valid pixels, and of valid pi
 constexpr double least_neighboured = 0.3;  ///< share of the valid pixels with a valid one next to them
 constexpr double all_alike = 0.999;        ///< share of the values that are exactly 0, or exactly 1
 constexpr std::size_t enough_values = 100; ///< fewer may be alike by chance
-constexpr double largest_error = 0.2;      ///< RMS that is expected of a view
 
 /// Shares of the valid pixels with a valid one at most two to the left or right, and above or below.
 std::array<double, 2> neighboured(const cv::Mat1f& z_m) {
@@ -130,10 +129,6 @@ std::vector<std::string> doubts_about(const ComputedFrame& computed, double radi
     doubt_radius_in_view(computed.depth, radius_m, unit, doubts);
     doubt_noise_in_view(computed.depth, radius_m, noise, unit, doubts);
     doubt_steps_in_view(radius_m, noise, unit, doubts);
-    add_if(radius_m > 0 && computed.expected_error > largest_error, doubts, // without a radius nothing is known
-           fmt::format("an error of {:.2f} RMS is expected, as such pixels had with this method on generated scenes: "
-                       "values say little. ao_confidence tells where; --preset balanced or best may err less.",
-                       computed.expected_error));
     if (!computed.frame.cloud) // a cloud's camera is recovered or chosen, not given, unless --camera names it
         std::ranges::move(doubts_about(computed.camera, computed.depth, unit), std::back_inserter(doubts));
     return doubts;

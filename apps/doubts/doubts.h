@@ -7,7 +7,6 @@
 #include "projection/length_unit.h"
 #include "projection/sensor/noise.h"
 
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -22,7 +21,6 @@ struct ComputedFrame {
     const DepthImage& depth;                    ///< of a view
     const cv::Mat1f& visibility;                ///< of a view
     const PointVisibility* of_points = nullptr; ///< by rays from every point; null = of a view
-    double expected_error = std::numeric_limits<double>::quiet_NaN(); ///< RMS of a view's values; NaN = unknown
 };
 
 /// Sentences: what is implausible about a computed frame, its camera or its settings. Empty = nothing is. Real captures

@@ -143,10 +143,11 @@ struct Totals {
 
 std::size_t settled(const Totals& totals) { return totals.ok + totals.doubtful + totals.failed; }
 
-int code_of(const Totals& totals, bool hooks) {
+/// `strict`: doubtful results count like failed frames.
+int code_of(const Totals& totals, bool hooks, bool strict) {
     if (settled(totals) < totals.frames || (hooks && totals.delivered + totals.refused < totals.tasks))
         return unfinished;
-    if (totals.failed + totals.doubtful + totals.refused == 0)
+    if (totals.failed + (strict ? totals.doubtful : 0) + totals.refused == 0)
         return all_well;
     return totals.ok + totals.doubtful == 0 ? nothing_done : some_failed;
 }
@@ -233,12 +234,16 @@ class Pages {
 
 // ---------------------------------------------------------------------------------------------------- the commands
 
+constexpr const char* strict_help = "doubtful results make the exit code 2, as failed frames do";
+
 class Status final : public Command {
   public:
     Words words() override { return {"JOB", "the job's folder", &job_, 1, 1}; }
 
     std::vector<Stage> stages() override {
-        return {{"output", {{.name = "json", .help = "prints JSON instead of lines", .value = &as_json_}}}};
+        return {{"output",
+                 {{.name = "json", .help = "prints JSON instead of lines", .value = &as_json_},
+                  {.name = "strict", .help = strict_help, .value = &strict_}}}};
     }
 
     int run() override {
@@ -255,7 +260,7 @@ class Status final : public Command {
             fmt::print("{}\n", text_of(status_json(totals, running, plan)));
         else
             print_all(totals, running, plan);
-        return code_of(totals, plan.hooks.any());
+        return code_of(totals, plan.hooks.any(), strict_);
     }
 
   private:
@@ -306,7 +311,7 @@ class Status final : public Command {
     }
 
     std::vector<std::string> job_;
-    bool as_json_ = false;
+    bool as_json_ = false, strict_ = false;
 };
 
 class Merge final : public Command {
@@ -317,7 +322,8 @@ class Merge final : public Command {
         return {{"output",
                  {{.name = "page",
                    .help = "index.html, a list of the captures, and a page for each",
-                   .value = OneOf(&page_, page_words)}}}};
+                   .value = OneOf(&page_, page_words)},
+                  {.name = "strict", .help = strict_help, .value = &strict_}}}};
     }
 
     int run() override {
@@ -343,7 +349,7 @@ class Merge final : public Command {
         if (page_)
             pages.write(plan, totals);
         print(totals, plan);
-        return code_of(totals, plan.hooks.any());
+        return code_of(totals, plan.hooks.any(), strict_);
     }
 
   private:
@@ -370,7 +376,7 @@ class Merge final : public Command {
 
     static constexpr std::array page_words{Named{"yes", true}, Named{"no", false}};
     std::vector<std::string> job_;
-    bool page_ = true;
+    bool page_ = true, strict_ = false;
 };
 
 } // namespace

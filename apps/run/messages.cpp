@@ -113,6 +113,11 @@ void conclude(const RunReport& report, const std::filesystem::path& table) {
     if (doubtful > 0)
         warn(fmt::format("  doubtful: {} (reasons in {})", names_of(report.frames, FrameStatus::doubtful),
                          table.string()));
+    constexpr double imprecise = 0.25; // RMS: a quarter of all that visibility can be
+    const auto errs = [](const FrameRow& row) { return is_done(row.status) && row.expected_error > imprecise; };
+    if (const auto frames = std::ranges::count_if(report.frames, errs); frames > 0)
+        say(fmt::format("  imprecise: an error above {} RMS is expected of {} frames (expected_error in {})", imprecise,
+                        frames, table.string()));
     if (count(report.frames, FrameStatus::failed) > 0)
         warn(fmt::format("  failed: {} (reasons in {})", names_of(report.frames, FrameStatus::failed), table.string()));
     if (const std::size_t skipped = count(report.frames, FrameStatus::skipped); skipped > 0)

@@ -187,8 +187,9 @@ std::vector<double> costs_of(const Capture& capture, const std::vector<std::size
 // ---------------------------------------------------------------------------------------------------- the command
 
 /// Settings of `run` that a plan leaves out: where and how it runs, and budgets, which depend on measured times.
-constexpr std::array not_planned = {"out",      "overwrite", "resume", "retry", "shard",     "scratch", "scratch-limit",
-                                    "no-locks", "dump",      "device", "log",   "max-error", "max-ms",  "quiet"};
+constexpr std::array not_planned = {"out",     "overwrite",     "resume",   "retry", "shard",
+                                    "scratch", "scratch-limit", "no-locks", "dump",  "device",
+                                    "log",     "max-error",     "max-ms",   "quiet", "strict"};
 
 class PlanCommand final : public Command {
   public:

@@ -43,7 +43,7 @@ class Run final : public Command {
             throw Misuse("run needs -o FOLDER for its results");
         asked_.resolve(); // refuses before anything is opened
         int unopened = 0;
-        Tally tally;
+        Tally tally(asked_.strict);
         std::vector<CaptureJob> jobs = plan(unopened, tally);
         for (const CaptureJob& job : jobs) {
             require_folders(job.folder());
@@ -155,8 +155,8 @@ class Run final : public Command {
             if (plan.hooks.any())
                 stored.emplace(job, plan, captures_.blocks(), asked_.scratch, asked_.scratch_limit_gb, asked_.retry,
                                interrupted);
-            const auto tally_of = [](const std::vector<FrameRow>& rows) {
-                Tally tally;
+            const auto tally_of = [&](const std::vector<FrameRow>& rows) {
+                Tally tally(asked_.strict);
                 tally.add(rows);
                 return tally.exit_code(0);
             };

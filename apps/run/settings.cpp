@@ -385,6 +385,7 @@ std::vector<Stage> RunSettings::common_stages() {
            .value = &s.resume,
            .common = true},
           {.name = "retry", .help = "with --resume: tries failed frames again, too", .value = &s.retry},
+          {.name = "strict", .help = "doubtful results make the exit code 2, as failed frames do", .value = &s.strict},
           {.name = "quiet", .help = "prints only warnings and failures", .value = &s.quiet, .common = true},
           {.name = "log",
            .help = "what stderr gets: prose, or a JSON object per line",

@@ -62,7 +62,7 @@ class RunSettings {
     std::string shard, scratch;
     bool no_locks = false;
     double scratch_limit_gb = 0;
-    bool quiet = false, log_json = false;
+    bool strict = false, quiet = false, log_json = false;
     CloudAoOptions clouds_by_points;
     SequenceAoOptions sequences;
 

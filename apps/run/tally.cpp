@@ -25,7 +25,7 @@ int Tally::exit_code(int unopened) const {
         return unfinished;
     if (faults_.contains(Fault::internal) || faults_.contains(Fault::crash))
         return internal_error;
-    if (ok_ == all_ && unopened == 0)
+    if (ok_ + (strict_ ? 0 : doubtful_) == all_ && unopened == 0)
         return all_well;
     return ok_ + doubtful_ == 0 ? nothing_done : some_failed;
 }

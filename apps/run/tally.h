@@ -13,6 +13,8 @@ namespace scanshade {
 /// Counts results of frames for the exit code.
 class Tally {
   public:
+    /// `strict`: a doubtful result counts like a failed one for the exit code.
+    explicit Tally(bool strict) : strict_(strict) {}
     void add(const std::vector<FrameRow>& rows);
     /// Of a whole capture.
     void add(Fault fault) { faults_.insert(fault); }
@@ -22,6 +24,7 @@ class Tally {
     [[nodiscard]] int exit_code(int unopened) const;
 
   private:
+    bool strict_;
     std::size_t all_ = 0, ok_ = 0, doubtful_ = 0;
     std::set<Fault> faults_;
 };

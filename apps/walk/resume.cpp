@@ -37,11 +37,13 @@ constexpr std::array aside = {"frames",         "camera",
                               "preset",         "quiet",
                               "colour",         "page",
                               "page-points",    "tar",
-                              "shade",          "light"};
+                              "strict",         "shade",
+                              "light"};
 
 /// Settings that change no results when they are typed differently.
-constexpr std::array elsewhere = {"out",           "overwrite", "dump", "resume", "retry",     "shard",  "scratch",
-                                  "scratch-limit", "no-locks",  "log",  "device", "in-flight", "preset", "quiet"};
+constexpr std::array elsewhere = {"out",    "overwrite", "dump",          "resume",   "retry",
+                                  "shard",  "scratch",   "scratch-limit", "no-locks", "log",
+                                  "device", "in-flight", "preset",        "quiet",    "strict"};
 
 std::string row_text(const Parameter& row) { return row.name + "=" + value_text(row); }
 

@@ -38,7 +38,7 @@ struct Work {
 
 using WorkPtr = std::shared_ptr<Work>;
 
-/// What is judged once it is computed. Reads `row.valid_share`, `row.coverage` and `row.expected_error`.
+/// What is judged once it is computed. Reads `row.valid_share` and `row.coverage`.
 [[nodiscard]] inline ComputedFrame computed_frame(const Work& work) {
     return {work.frame,
             work.row.camera,
@@ -46,8 +46,7 @@ using WorkPtr = std::shared_ptr<Work>;
             work.row.coverage,
             work.depth,
             work.ao.visibility,
-            work.by_points ? &work.of_points : nullptr,
-            work.row.expected_error};
+            work.by_points ? &work.of_points : nullptr};
 }
 
 } // namespace scanshade

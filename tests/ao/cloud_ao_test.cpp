@@ -204,7 +204,7 @@ TEST(CloudAo, the_expected_error_is_near_the_true_one) {
             ASSERT_TRUE(found.expected_error);
             EXPECT_LT(*found.expected_error, 2 * error) << name << ", " << points;
             EXPECT_GT(*found.expected_error, error / 2) << name << ", " << points;
-            EXPECT_EQ(*found.expected_error > 0.12, !found.doubts.empty()) << tests::joined(found.doubts);
+            EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
         }
 }
 

@@ -114,7 +114,7 @@ TEST_F(RunsTest, a_scene_too_small_for_the_usual_radius_gets_its_own) {
     EXPECT_EQ(resumed.exit_code, all_well);
     EXPECT_TRUE(says(resumed.out + resumed.err, "done already")) << resumed.out << resumed.err;
     // What a person says stays.
-    const Ran told = run_program(both + "--depth-noise none --overwrite --radius 0.4");
+    const Ran told = run_program(both + "--depth-noise none --overwrite --radius 0.4 --strict");
     EXPECT_EQ(radius_in("thing/manifest.json"), 0.4);
     EXPECT_EQ(told.exit_code, some_failed) << "more than half of it";
     EXPECT_FALSE(says(told.err, "the scene is only"));

@@ -184,8 +184,8 @@ TEST_P(BrokenData, the_program_ends_with_the_code_it_deserves) {
     if (!tests::program_is_built())
         GTEST_SKIP() << "the program is not built";
     const TemporaryFolder folder;
-    const tests::Ran ran =
-        tests::run_program(fmt::format("run {} -o {} --write ao", run_on(path, c.reader), (folder / "out").string()));
+    const tests::Ran ran = tests::run_program(
+        fmt::format("run {} -o {} --write ao --strict", run_on(path, c.reader), (folder / "out").string()));
     const int some_frames_are_bad = 2, nothing_could_be_done = 3;
     EXPECT_EQ(ran.exit_code, c.refused                                  ? nothing_could_be_done
                              : c.reader == Reader::camera || c.doubtful ? some_frames_are_bad
