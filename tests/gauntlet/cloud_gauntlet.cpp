@@ -263,6 +263,6 @@ int main(int count, char** arguments) {
     using namespace scanshade::gauntlet;
     Gauntlet gauntlet({arguments + 1, arguments + count});
     run_generated(gauntlet);
-    run_real(gauntlet, tests::data_folder());
+    run_real(gauntlet, scanshade::tests::data_folder());
     return gauntlet.silently_wrong() ? 1 : 0;
 }

@@ -411,7 +411,7 @@ int main(int count, char** arguments) {
     using namespace scanshade::gauntlet;
     const scanshade::Stopwatch stopwatch;
     Gauntlet gauntlet({arguments + 1, arguments + count});
-    const std::filesystem::path folder = tests::data_folder();
+    const std::filesystem::path folder = scanshade::tests::data_folder();
     for (const char* sensor : {"ideal", "kinect", "tof"})
         run_generated(gauntlet, sensor, true);
     run_generated(gauntlet, "kinect", false);
