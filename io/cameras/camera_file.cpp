@@ -53,7 +53,7 @@ char first_in(const CameraText& text) {
     const auto first = text.bytes.find_first_not_of("\xEF\xBB\xBF \t\r\n");
     return first == std::string::npos ? '\0' : text.bytes[first];
 }
-bool is_json(const CameraText& text) { return first_in(text) == '{' || first_in(text) == '['; }
+bool is_json(const CameraText& text) { return first_in(text) == '{'; }
 bool is_xml(const CameraText& text) { return first_in(text) == '<'; }
 /// YAML has keys at the start of lines. A file with such a key that is not JSON counts as YAML.
 bool is_yaml(const CameraText& text) {
@@ -143,7 +143,7 @@ constexpr CameraFormatRow formats[] = {
      .written = [](const CameraFile& file, const Quality&) { return camera_as_colmap(file.camera); }},
     {.name = "matrix",
      .recognised = "lines of numbers",
-     .content = "a 3x3 matrix, row by row",
+     .content = "a matrix 3x3, 3x4 or 4x4, row by row, or fx fy cx cy",
      .is = is_anything,
      .read = read_matrix},
 };

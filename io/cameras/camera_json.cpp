@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
@@ -118,10 +119,16 @@ Pinhole from_columns(const fs::path& file, const std::vector<double>& m) {
     return camera;
 }
 
+/// Our name of a key, or the one by which others know it: librealsense says ppx and ppy.
+std::string either(const Json& object, const char* ours, const char* theirs) {
+    return !object.contains(ours) && object.contains(theirs) ? theirs : ours;
+}
+
 Pinhole from_keys(const fs::path& file, const Json& object) {
     const auto value = [&](const std::string& key) { return number_of(file, member(file, object, key), key); };
-    const Pinhole camera{value("fx"), value("fy"), value("cx"), value("cy"), {}};
-    check_numbers(file, camera, {"\"fx\"", "\"fy\"", "\"cx\"", "\"cy\""});
+    const std::string cx = either(object, "cx", "ppx"), cy = either(object, "cy", "ppy");
+    const Pinhole camera{value("fx"), value("fy"), value(cx), value(cy), {}};
+    check_numbers(file, camera, {"\"fx\"", "\"fy\"", in_quotes(cx), in_quotes(cy)});
     return camera;
 }
 
@@ -177,7 +184,8 @@ Camera one_camera(const fs::path& file, const Json& object) {
     camera.pinhole = object.contains("intrinsic_matrix")
                          ? from_columns(file, numbers_of(file, object, "intrinsic_matrix", 9))
                          : from_keys(file, object);
-    camera.pinhole.size = {size_of(file, object, "width"), size_of(file, object, "height")};
+    camera.pinhole.size = {size_of(file, object, either(object, "width", "w")),
+                           size_of(file, object, either(object, "height", "h"))};
     camera.distortion = lens_of(file, object);
     return camera;
 }
@@ -192,6 +200,78 @@ DepthCorrection correction_of(const fs::path& file, const Json& object) {
     if (correction.scale <= 0)
         refuse_camera(file, fmt::format("\"scale\" is {}, a positive number expected", correction.scale));
     return correction;
+}
+
+/// The unit of depths by a key of others, which mean different things by the same name: metres per unit (librealsense
+/// 0.001, nerfstudio), millimetres per unit (BOP 0.1 and 1), units per metre (Open3D 1000, NICE-SLAM 6553.5). The
+/// number tells them apart, since sensors store 0.01 to 10 mm a unit. Says how it was taken; where it is none of these,
+/// that it is not used.
+void take_depth_scale(const fs::path& file, const Json& object, CameraFile& result) {
+    constexpr std::array keys{"depth_scale", "png_depth_scale", "depth_factor", "integer_depth_scale",
+                              "depth_unit_scale_factor"};
+    for (const char* key : keys) {
+        if (!object.contains(key))
+            continue;
+        const double scale = number_of(file, object[key], key);
+        const auto take = [&](double units, const char* meaning) {
+            result.depth_units_per_metre = units;
+            result.warnings.push_back(fmt::format("{}: \"{}\" {:g} was taken as {}: {:g} units per metre.",
+                                                  file.string(), key, scale, meaning, units));
+        };
+        if (result.depth_units_per_metre || !(scale > 0) || (scale > 10 && scale < 100))
+            result.warnings.push_back(fmt::format("{}: \"{}\" {:g} is not used.", file.string(), key, scale));
+        else if (scale <= 0.01)
+            take(1 / scale, "metres per unit");
+        else if (scale <= 10)
+            take(1000 / scale, "millimetres per unit, as in BOP");
+        else
+            take(scale, "units per metre");
+    }
+}
+
+/// Names the numbers in the file that nothing reads: one of them may be what makes the depths wrong.
+void name_unused(const fs::path& file, const Json& object, CameraFile& result) {
+    constexpr std::array used{"intrinsic_matrix",
+                              "fx",
+                              "fy",
+                              "cx",
+                              "cy",
+                              "ppx",
+                              "ppy",
+                              "width",
+                              "height",
+                              "w",
+                              "h",
+                              "distortion",
+                              "fisheye",
+                              "distortion_coefficients",
+                              "dist_coeffs",
+                              "distCoeffs",
+                              "dist",
+                              "coeffs",
+                              "D",
+                              "k1",
+                              "k2",
+                              "p1",
+                              "p2",
+                              "k3",
+                              "k4",
+                              "k5",
+                              "k6",
+                              "depth_units_per_metre",
+                              "depth_scale",
+                              "png_depth_scale",
+                              "depth_factor",
+                              "integer_depth_scale",
+                              "depth_unit_scale_factor",
+                              "pose_time_offset_s"};
+    std::vector<std::string> unused;
+    for (const auto& [key, value] : object.items())
+        if ((value.is_number() || (value.is_array() && !value.empty() && value[0].is_number())) &&
+            !std::ranges::count(used, key))
+            unused.push_back(in_quotes(key));
+    if (!unused.empty())
+        result.warnings.push_back(fmt::format("{}: not used: {}.", file.string(), fmt::join(unused, ", ")));
 }
 
 /// The secondary camera, which took the colour images.
@@ -228,6 +308,8 @@ CameraFile camera_from_json(const fs::path& file, const std::string& text) {
             refuse_camera(file, fmt::format("\"depth_units_per_metre\" is {}, expected a positive number", units));
         result.depth_units_per_metre = units;
     }
+    take_depth_scale(file, object, result);
+    name_unused(file, object, result);
     if (object.contains("registered")) {
         if (!object["registered"].is_boolean())
             refuse_camera(file, "\"registered\" is not true or false");

@@ -1,7 +1,8 @@
-// Cameras as text: 3x3 matrices and BundleFusion's info.txt.
+// Cameras as text: matrices, four numbers, and BundleFusion's info.txt.
 #include "io/cameras/camera_formats.h"
 #include "projection/base/error.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -79,36 +80,43 @@ CameraFile camera_from_scan(const fs::path& file, const std::vector<TextLine>& l
     return result;
 }
 
+/// A matrix 3x3, 3x4 or 4x4 row by row, on as many lines as it likes, or fx fy cx cy; with commas, semicolons and
+/// brackets, as numpy prints it.
 CameraFile camera_from_matrix(const fs::path& file, const std::vector<TextLine>& lines) {
-    std::array<double, 9> m{};
-    int rows = 0;
+    std::vector<double> m;
     for (const TextLine& line : lines) {
-        const auto row = words(line.text);
-        if (row.empty() || row[0].starts_with('#'))
+        if (trimmed(line.text).starts_with('#'))
             continue;
-        if (rows == 3)
-            throw Error(at_line(file, line.number) + ": a fourth row, expected a 3x3 matrix");
-        if (row.size() != 3)
-            throw Error(fmt::format("{}: {}, expected 3 (a row of a 3x3 camera matrix)", at_line(file, line.number),
-                                    counted(row.size(), "value")));
-        for (std::size_t i = 0; i < 3; ++i) {
-            const auto value = number(row[i]);
+        std::string plain(line.text);
+        std::ranges::replace_if(
+            plain, [](char c) { return std::string_view("[](){},;").find(c) != std::string_view::npos; }, ' ');
+        for (const std::string_view word : words(plain)) {
+            const auto value = number(word);
             if (!value || !std::isfinite(*value))
-                throw Error(
-                    fmt::format("{}: {} is not a finite number", at_line(file, line.number), in_quotes(row[i])));
-            m[static_cast<std::size_t>(rows) * 3 + i] = *value;
+                throw Error(fmt::format("{}: {} is not a finite number, expected a camera matrix",
+                                        at_line(file, line.number), in_quotes(word)));
+            m.push_back(*value);
         }
-        ++rows;
     }
-    if (rows != 3)
-        refuse_camera(file,
-                      fmt::format("{}, expected a 3x3 camera matrix", counted(static_cast<std::size_t>(rows), "row")));
-    if (m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1)
-        refuse_camera(file, "not a camera matrix stored by rows: expected fx 0 cx, 0 fy cy, 0 0 1");
-    if (m[1] != 0)
-        refuse_camera(file, fmt::format("skew {} in line 1, a pinhole camera here has none", m[1]));
     CameraFile result;
-    result.camera.pinhole = {m[0], m[4], m[2], m[5], {}};
+    if (m.size() == 4) {
+        result.camera.pinhole = {m[0], m[1], m[2], m[3], {}};
+        check_numbers(file, result.camera.pinhole, {"fx", "fy", "cx", "cy"});
+        return result;
+    }
+    if (m.size() != 9 && m.size() != 12 && m.size() != 16)
+        refuse_camera(file, fmt::format("{}, expected a camera matrix of 3x3, 3x4 or 4x4, or fx fy cx cy",
+                                        counted(m.size(), "number")));
+    const std::size_t columns = m.size() == 9 ? 3 : 4;
+    const auto at = [&](std::size_t row, std::size_t column) { return m[row * columns + column]; };
+    const bool more =
+        columns == 4 && (at(0, 3) != 0 || at(1, 3) != 0 || at(2, 3) != 0 ||
+                         (m.size() == 16 && (at(3, 0) != 0 || at(3, 1) != 0 || at(3, 2) != 0 || at(3, 3) != 1)));
+    if (more || at(1, 0) != 0 || at(2, 0) != 0 || at(2, 1) != 0 || at(2, 2) != 1)
+        refuse_camera(file, "not a camera matrix stored by rows: expected fx 0 cx, 0 fy cy, 0 0 1");
+    if (at(0, 1) != 0)
+        refuse_camera(file, fmt::format("skew {}, a pinhole camera here has none", at(0, 1)));
+    result.camera.pinhole = {at(0, 0), at(1, 1), at(0, 2), at(1, 2), {}};
     check_numbers(file, result.camera.pinhole, {"fx", "fy", "cx", "cy"});
     return result;
 }

@@ -133,6 +133,57 @@ TEST(camera_files, bundle_fusion_info_gives_size_and_depth_unit) {
     EXPECT_EQ(read.depth_units_per_metre, 1000);
 }
 
+TEST(camera_files, depth_scales_of_others_are_used_and_said_or_named_as_unused) {
+    const TemporaryFolder folder;
+    struct Row {
+        const char* keys;
+        std::optional<double> units_per_metre;
+        const char* said;
+    };
+    for (const Row& row :
+         {Row{R"("depth_scale":0.1)", 10000, "millimetres per unit"}, // BOP
+          {R"("depth_scale":1.0)", 1000, "millimetres per unit"},
+          {R"("depth_scale":0.001)", 1000, "metres per unit"}, // librealsense
+          {R"("depth_scale":0.00025)", 4000, "metres per unit"},
+          {R"("integer_depth_scale":0.0002)", 5000, "metres per unit"},
+          {R"("depth_scale":5000)", 5000, "units per metre"}, // Open3D
+          {R"("png_depth_scale":6553.5)", 6553.5, "units per metre"},
+          {R"("depth_scale":50)", std::nullopt, "\"depth_scale\" 50 is not used"},
+          {R"("depth_scale":-1)", std::nullopt, "\"depth_scale\" -1 is not used"},
+          {R"("depth_units_per_metre":1000,"depth_scale":0.1)", 1000, "\"depth_scale\" 0.1 is not used"},
+          {R"("depth_max":4,"baseline":[0.05,0,0])", std::nullopt, "not used: \"baseline\", \"depth_max\""},
+          {R"("name":"left","k1":0.1)", std::nullopt, nullptr}}) {
+        SCOPED_TRACE(row.keys);
+        const auto read = read_camera_file(
+            write_file(folder / "camera.json",
+                       fmt::format(R"({{"fx":140,"fy":141,"ppx":79.5,"ppy":59.5,"w":160,"h":120,{}}})", row.keys)));
+        EXPECT_EQ(read.camera.pinhole.cx, 79.5);
+        EXPECT_EQ(read.camera.pinhole.size, cv::Size(160, 120));
+        ASSERT_EQ(read.depth_units_per_metre.has_value(), row.units_per_metre.has_value());
+        EXPECT_NEAR(read.depth_units_per_metre.value_or(0), row.units_per_metre.value_or(0), 1e-6);
+        EXPECT_EQ(read.warnings.empty(), !row.said) << tests::joined(read.warnings);
+        EXPECT_TRUE(says(tests::joined(read.warnings), row.said ? row.said : "")) << tests::joined(read.warnings);
+    }
+}
+
+TEST(camera_files, matrices_as_others_write_them) {
+    const TemporaryFolder folder;
+    for (const char* text : {"140 0 79.5\n0 140 59.5\n0 0 1\n", "140,0,79.5,0,140,59.5,0,0,1", "140 140 79.5 59.5\n",
+                             "[[140. 0. 79.5]\n [0. 140. 59.5]\n [0. 0. 1.]]\n", "# fx fy cx cy\n140, 140, 79.5, 59.5",
+                             "140 0 79.5 0\n0 140 59.5 0\n0 0 1 0\n0 0 0 1\n", "140 0 79.5 0 0 140 59.5 0 0 0 1 0"}) {
+        const Pinhole read = read_camera_file(write_file(folder / "K.txt", text)).camera.pinhole;
+        EXPECT_EQ(std::tuple(read.fx, read.fy, read.cx, read.cy), std::tuple(140, 140, 79.5, 59.5)) << text;
+    }
+    const auto refused = [&](const char* text) {
+        return refusal([&] { (void)read_camera_file(write_file(folder / "K.txt", text)); });
+    };
+    EXPECT_TRUE(says(refused("140 0 79.5\n0 140 59.5\n0 0 1\n0 0 0\n"), "stored by rows"));
+    EXPECT_TRUE(says(refused("1 2 3 4 5\n"), "5 numbers"));
+    EXPECT_TRUE(says(refused("140 0 79.5\n0 wide 59.5\n0 0 1\n"), "line 2"));
+    EXPECT_TRUE(says(refused("140 0 79.5 3\n0 140 59.5 0\n0 0 1 0\n0 0 0 1\n"), "stored by rows"));
+    EXPECT_TRUE(says(refused("140 2 79.5\n0 140 59.5\n0 0 1\n"), "skew 2"));
+}
+
 TEST(camera_files, every_format_comes_back_as_it_was_written) {
     const TemporaryFolder folder;
     const Pinhole pinhole{525.1234567890123, 524.9, 319.5, 239.25, {640, 480}};

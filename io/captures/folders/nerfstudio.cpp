@@ -246,8 +246,9 @@ std::optional<Listing> list_nerfstudio(const fs::path& folder) {
                 entry.warnings.push_back(
                     fmt::format("{}: {}; processed without colour.", where, trouble_with(folder, image)));
             entry.camera = camera_of(keys, file, size_of(entry.colour), size_of(entry.depth), entry.warnings);
-            if (const auto scale = keys.number(ngp ? "integer_depth_scale" : "depth_unit_scale_factor"))
-                if (*scale > 0)
+            // The first is instant-ngp's, the second nerfstudio's; converters write either.
+            for (const char* key : {"integer_depth_scale", "depth_unit_scale_factor"})
+                if (const auto scale = keys.number(key); scale && *scale > 0)
                     entry.depth_units_per_metre = 1 / *scale;
             take_pose(keys, where, entry);
             const double of_world = keys.number("applied_scale").value_or(1);

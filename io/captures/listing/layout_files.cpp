@@ -187,9 +187,13 @@ std::string trouble_with(const fs::path& folder, const std::string& name) {
 
 std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::string>& warnings) {
     std::vector<fs::path> candidates, others;
+    const auto calibrates = [](const fs::path& file) { // what speaks of a camera should be one, or is named
+        return speaks_of(file, {"calib", "camera", "intrinsic", "sensors"}) &&
+               !speaks_of(file, {"traj", "pose", "extrinsic"});
+    };
     for (const fs::path& file : files_in(folder)) {
-        const std::string name = file.filename().string();
-        const bool json = lower_extension(file) == ".json", text = lower_extension(file) == ".txt";
+        const std::string name = file.filename().string(), extension = lower_extension(file);
+        const bool json = extension == ".json", text = extension == ".txt";
         // Text files named after cameras are often poses or calibrations of another kind; JSON files rarely are.
         const bool promising =
             (json && speaks_of(file, {"cam", "intrinsic"}) && !speaks_of(file, {"traj", "pose", "extrinsic"})) ||
@@ -200,6 +204,8 @@ std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::str
             candidates.push_back(file);
         else if (json || name == "info.txt" || name == "_info.txt")
             others.push_back(file);
+        else if ((text || extension == ".yaml" || extension == ".yml" || extension == ".xml") && calibrates(file))
+            others.insert(others.begin(), file);
     }
     std::optional<CameraFile> found;
     for (const fs::path& file : candidates) {
@@ -215,8 +221,10 @@ std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::str
             found = read_camera_file(*other);
         } catch (const Outage&) {
             throw;
-        } catch (const Error&) {
-            continue; // other names may hold anything
+        } catch (const Error& failure) {
+            if (calibrates(*other)) // other names may hold anything
+                warnings.push_back(
+                    fmt::format("{}: not used as the camera: {}.", other->filename().string(), failure.what()));
         }
     }
     return found;
