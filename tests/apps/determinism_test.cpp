@@ -2,9 +2,9 @@
 // tests/golden/hashes.txt, so that no change of results goes unnoticed.
 //
 // The hashes are those of one driver on one width of vectors, since compilers round differently, and of one family of
-// processors: families 25 and 26 of AMD and 6 of Intel agree, 23 of AMD differs. A line is DEVICE | METHOD | HASH. On a device
-// without lines the comparison is skipped. UPDATE_GOLDEN=1 writes them anew: for a change that is meant, with its
-// reason and its errors before and after in the commit's message.
+// processors: families 25 and 26 of AMD and 6 of Intel agree, 23 of AMD differs. A line is DEVICE | METHOD | HASH. On a
+// device without lines the comparison is skipped. UPDATE_GOLDEN=1 writes them anew: for a change that is meant, with
+// its reason and its errors before and after in the commit's message.
 #include "ao/base/method.h"
 #include "ao/gpu/device.h"
 #include "io/content_hash.h"
