@@ -53,7 +53,10 @@ char first_in(const CameraText& text) {
     const auto first = text.bytes.find_first_not_of("\xEF\xBB\xBF \t\r\n");
     return first == std::string::npos ? '\0' : text.bytes[first];
 }
-bool is_json(const CameraText& text) { return first_in(text) == '{'; }
+/// A bracket may begin a printed matrix, too.
+bool is_json(const CameraText& text) {
+    return first_in(text) == '{' || (first_in(text) == '[' && lower_extension(text.file) == ".json");
+}
 bool is_xml(const CameraText& text) { return first_in(text) == '<'; }
 /// YAML has keys at the start of lines. A file with such a key that is not JSON counts as YAML.
 bool is_yaml(const CameraText& text) {

@@ -84,7 +84,10 @@ CameraFile camera_from_scan(const fs::path& file, const std::vector<TextLine>& l
 /// brackets, as numpy prints it.
 CameraFile camera_from_matrix(const fs::path& file, const std::vector<TextLine>& lines) {
     std::vector<double> m;
+    std::size_t in_first_row = 0;
+    int uneven_line = 0; // whose count is not the first row's
     for (const TextLine& line : lines) {
+        const std::size_t before = m.size();
         if (trimmed(line.text).starts_with('#'))
             continue;
         std::string plain(line.text);
@@ -97,6 +100,11 @@ CameraFile camera_from_matrix(const fs::path& file, const std::vector<TextLine>&
                                         at_line(file, line.number), in_quotes(word)));
             m.push_back(*value);
         }
+        const std::size_t row = m.size() - before;
+        if (in_first_row == 0)
+            in_first_row = row;
+        else if (row > 0 && row != in_first_row && uneven_line == 0)
+            uneven_line = line.number;
     }
     CameraFile result;
     if (m.size() == 4) {
@@ -105,8 +113,10 @@ CameraFile camera_from_matrix(const fs::path& file, const std::vector<TextLine>&
         return result;
     }
     if (m.size() != 9 && m.size() != 12 && m.size() != 16)
-        refuse_camera(file, fmt::format("{}, expected a camera matrix of 3x3, 3x4 or 4x4, or fx fy cx cy",
-                                        counted(m.size(), "number")));
+        throw Error(fmt::format(
+            "{}: {}, expected a camera matrix of 3x3, 3x4 or 4x4, or fx fy cx cy",
+            uneven_line > 0 ? at_line(file, uneven_line) + " is shorter or longer than the first row" : file.string(),
+            counted(m.size(), "number")));
     const std::size_t columns = m.size() == 9 ? 3 : 4;
     const auto at = [&](std::size_t row, std::size_t column) { return m[row * columns + column]; };
     const bool more =
