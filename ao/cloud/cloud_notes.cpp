@@ -26,7 +26,8 @@ std::string told_sides(const SettledSides& sides, bool recorded) {
 ToldError told_error(double error, double by_check) {
     constexpr double largest_by_check = 0.22; // noise alone makes up to 0.2 of what errs by less than 0.1
     ToldError told{fmt::format("an error of {:.2f} RMS is expected (--write error: of every point).", error), {}};
-    if (by_check > largest_by_check)
+    constexpr double precise = 0.12; // a result that says it errs more needs no contradiction
+    if (error <= precise && by_check > largest_by_check)
         told.doubt = fmt::format("a part of the points by themselves give quite other values, as if the error were "
                                  "{:.2f} RMS; ao_confidence shows where.",
                                  by_check);

@@ -199,6 +199,7 @@ std::vector<CloudErrorSample> samples_of(const char* name, int number) {
 TEST(CloudErrors, a_large_error_is_said_and_a_very_large_one_by_the_check_alone_is_a_reason_to_doubt) {
     EXPECT_FALSE(told_error(0.05, 0.05).doubt);
     EXPECT_FALSE(told_error(0.2, 0.05).doubt) << "precision is a property of the result";
+    EXPECT_FALSE(told_error(0.2, 0.25).doubt) << "what is said to be imprecise is not contradicted by the check";
     EXPECT_TRUE(told_error(0.2, 0.05).note.starts_with("an error of 0.20 RMS is expected"));
     EXPECT_FALSE(told_error(0.05, 0.2).doubt) << "noise may do that";
     ASSERT_TRUE(told_error(0.05, 0.25).doubt) << "the factors have not seen every kind of cloud";
