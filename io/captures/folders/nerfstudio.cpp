@@ -177,7 +177,7 @@ bool has_ngp_depth(const Keys& keys) {
 /// all.
 DepthEncoding unit_of(const CaptureEntry& first) {
     constexpr float farthest_m = 50;
-    const DepthEncoding assumed = assumed_encoding(first.depth);
+    DepthEncoding assumed = assumed_encoding(first.depth);
     if (assumed.name != "m")
         return assumed;
     try {
