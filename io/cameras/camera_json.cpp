@@ -142,12 +142,13 @@ bool names_fisheye(const Json& object) {
     });
 }
 
+constexpr std::array lists{"distortion", "fisheye", "distortion_coefficients", "dist_coeffs", "distCoeffs", "dist",
+                           "coeffs",     "D"};
+constexpr std::array numbers{"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
+
 /// Ours are `distortion` and `fisheye`. Other names that lenses go by are read, too, for one left out bends planes:
 /// lists, and single numbers as instant-ngp has them.
 Distortion lens_of(const fs::path& file, const Json& object) {
-    constexpr std::array lists{"distortion", "fisheye", "distortion_coefficients", "dist_coeffs", "distCoeffs", "dist",
-                               "coeffs",     "D"};
-    constexpr std::array numbers{"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
     const auto is_there = [&](const char* key) { // null and an empty list say that there is no lens
         return object.contains(key) && !object[key].empty();
     };
@@ -202,14 +203,15 @@ DepthCorrection correction_of(const fs::path& file, const Json& object) {
     return correction;
 }
 
+constexpr std::array depth_scales{"depth_scale", "png_depth_scale", "depth_factor", "integer_depth_scale",
+                                  "depth_unit_scale_factor"};
+
 /// The unit of depths by a key of others, which mean different things by the same name: metres per unit (librealsense
 /// 0.001, nerfstudio), millimetres per unit (BOP 0.1 and 1), units per metre (Open3D 1000, NICE-SLAM 6553.5). The
 /// number tells them apart, since sensors store 0.01 to 10 mm a unit. Says how it was taken; where it is none of these,
 /// that it is not used.
 void take_depth_scale(const fs::path& file, const Json& object, CameraFile& result) {
-    constexpr std::array keys{"depth_scale", "png_depth_scale", "depth_factor", "integer_depth_scale",
-                              "depth_unit_scale_factor"};
-    for (const char* key : keys) {
+    for (const char* key : depth_scales) {
         if (!object.contains(key))
             continue;
         const double scale = number_of(file, object[key], key);
@@ -231,44 +233,17 @@ void take_depth_scale(const fs::path& file, const Json& object, CameraFile& resu
 
 /// Names the numbers in the file that nothing reads: one of them may be what makes the depths wrong.
 void name_unused(const fs::path& file, const Json& object, CameraFile& result) {
-    constexpr std::array used{"intrinsic_matrix",
-                              "fx",
-                              "fy",
-                              "cx",
-                              "cy",
-                              "ppx",
-                              "ppy",
-                              "width",
-                              "height",
-                              "w",
-                              "h",
-                              "distortion",
-                              "fisheye",
-                              "distortion_coefficients",
-                              "dist_coeffs",
-                              "distCoeffs",
-                              "dist",
-                              "coeffs",
-                              "D",
-                              "k1",
-                              "k2",
-                              "p1",
-                              "p2",
-                              "k3",
-                              "k4",
-                              "k5",
-                              "k6",
-                              "depth_units_per_metre",
-                              "depth_scale",
-                              "png_depth_scale",
-                              "depth_factor",
-                              "integer_depth_scale",
-                              "depth_unit_scale_factor",
-                              "pose_time_offset_s"};
+    constexpr std::array others{
+        "intrinsic_matrix",  "fx", "fy", "cx", "cy", "ppx", "ppy", "width", "height", "w", "h", "depth_units_per_metre",
+        "pose_time_offset_s"};
+    const auto used = [&](const std::string& key) {
+        return std::ranges::count(others, key) + std::ranges::count(lists, key) + std::ranges::count(numbers, key) +
+                   std::ranges::count(depth_scales, key) >
+               0;
+    };
     std::vector<std::string> unused;
     for (const auto& [key, value] : object.items())
-        if ((value.is_number() || (value.is_array() && !value.empty() && value[0].is_number())) &&
-            !std::ranges::count(used, key))
+        if ((value.is_number() || (value.is_array() && !value.empty() && value[0].is_number())) && !used(key))
             unused.push_back(in_quotes(key));
     if (!unused.empty())
         result.warnings.push_back(fmt::format("{}: not used: {}.", file.string(), fmt::join(unused, ", ")));
