@@ -169,6 +169,10 @@ cv::Mat1f facing_camera(const cv::Mat1f& z_m, const Pinhole& camera) {
     return cosine;
 }
 
+bool has_colours(const Cloud& cloud) {
+    return std::ranges::any_of(cloud.colours, [](const cv::Vec3b& colour) { return colour != cv::Vec3b(); });
+}
+
 std::vector<cv::Vec3b> greys(const std::vector<float>& visibility) {
     std::vector<cv::Vec3b> colours(visibility.size());
     std::ranges::transform(visibility, colours.begin(), [](float value) {

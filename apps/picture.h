@@ -2,6 +2,7 @@
 #pragma once
 
 #include "projection/camera.h"
+#include "projection/frame.h"
 
 #include <opencv2/core.hpp>
 #include <string>
@@ -15,6 +16,9 @@ namespace scanshade {
 
 /// Visibility as grey, 1 = white; where there is no surface a dim blue that no visibility has.
 [[nodiscard]] cv::Mat3b visibility_picture(const cv::Mat1f& visibility);
+
+/// Whether the cloud's points have colours of their own: some programs write all of them as zero.
+[[nodiscard]] bool has_colours(const Cloud& cloud);
 
 /// Values of points as grey, so that 255 is open; black where they are not known.
 [[nodiscard]] std::vector<cv::Vec3b> greys(const std::vector<float>& visibility);

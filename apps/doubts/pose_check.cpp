@@ -43,9 +43,10 @@ struct Told {
     std::optional<PoseReading> reading;
 };
 
-Told told_by(const Capture& capture, std::size_t a, std::size_t b) {
+Told told_by(const Capture& capture, const std::function<Frame(std::size_t)>& load, std::size_t a, std::size_t b) {
     const auto posed = [&](std::size_t index) {
-        return PosedDepth{project(capture.load(index, false)), *capture.entries[index].world_from_camera};
+        return PosedDepth{project(load ? load(index) : capture.load(index, false)),
+                          *capture.entries[index].world_from_camera};
     };
     try {
         const PosedDepth one = posed(a), other = posed(b);
@@ -114,12 +115,13 @@ std::string reading_warning(const std::vector<PoseReading>& readings, std::size_
 
 } // namespace
 
-PoseCheck check_poses(const Capture& capture, const std::vector<std::size_t>& frames) {
+PoseCheck check_poses(const Capture& capture, const std::vector<std::size_t>& frames,
+                      const std::function<Frame(std::size_t)>& load) {
     constexpr std::size_t pairs = 3;
     std::vector<std::size_t> posed;
     for (const std::size_t i : frames)
         if (const CaptureEntry& entry = capture.entries[i];
-            entry.world_from_camera && !entry.depth.empty() && entry.problem.empty())
+            entry.world_from_camera && (load || !entry.depth.empty()) && entry.problem.empty())
             posed.push_back(i);
     const std::vector<std::size_t> chosen = spread(pairs, posed.size());
     std::vector<Told> found(chosen.size());
@@ -127,10 +129,10 @@ PoseCheck check_poses(const Capture& capture, const std::vector<std::size_t>& fr
         tbb::parallel_for(std::size_t(0), chosen.size(), [&](std::size_t i) {
             const std::size_t index = posed[chosen[i]];
             if (const auto partner = partner_of(capture, index, posed))
-                found[i] = told_by(capture, index, *partner);
+                found[i] = told_by(capture, load, index, *partner);
             // Wrong poses choose badly; the next frame sees the same all the same.
             if (const auto next = std::ranges::upper_bound(posed, index); !found[i].reading && next != posed.end())
-                found[i].reading = told_by(capture, index, *next).reading;
+                found[i].reading = told_by(capture, load, index, *next).reading;
         });
     });
     std::vector<double> factors;

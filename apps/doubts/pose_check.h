@@ -4,6 +4,7 @@
 #include "io/captures/capture.h"
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,8 @@ struct PoseCheck {
 
 /// Whether pairs of the frames agree that all depths are too long or too short for the poses' motion, or that the poses
 /// must be read in another way. By a factor of more than 20, poses in another unit are likelier than depths.
-/// Decodes up to six depth images.
-[[nodiscard]] PoseCheck check_poses(const Capture& capture, const std::vector<std::size_t>& frames);
+/// Decodes up to six depth images, by `load` where the capture is a list of images in memory.
+[[nodiscard]] PoseCheck check_poses(const Capture& capture, const std::vector<std::size_t>& frames,
+                                    const std::function<Frame(std::size_t)>& load = {});
 
 } // namespace scanshade

@@ -35,6 +35,28 @@ fs::path tiles_folder(const fs::path& results, const std::string& name) {
     return results / (".tiles-" + shortened(name, 200));
 }
 
+std::optional<CloudShape> large_shape(const fs::path& file, std::size_t most_at_once,
+                                      std::vector<std::string>& warnings, std::string& why_not) {
+    try {
+        std::optional<CloudShape> shape = cloud_shape(file, warnings);
+        if (!shape || shape->records.point_count <= most_at_once || shape->records.grid.height > 1)
+            return std::nullopt;
+        if (shape->whole_since.empty())
+            return shape;
+        why_not = shape->whole_since;
+    } catch (const Outage&) {
+        throw;
+    } catch (const Error&) { // loading it reports the error
+    }
+    return std::nullopt;
+}
+
+bool is_large_cloud(const fs::path& file, std::size_t most_at_once) {
+    std::vector<std::string> warnings;
+    std::string why_not;
+    return large_shape(file, most_at_once, warnings, why_not).has_value();
+}
+
 void remove_left_tiles(const fs::path& folder) {
     std::error_code ignored;
     fs::remove_all(folder, ignored);

@@ -74,6 +74,12 @@ class LargeCloudRun {
     std::mutex mutex_;
 };
 
+/// The shape of a cloud that has more points than `most_at_once` and can be read in blocks; nothing for all others, and
+/// for a file that cannot be read: loading it says why. `why_not`: set where a large cloud cannot be read in blocks.
+[[nodiscard]] std::optional<CloudShape> large_shape(const std::filesystem::path& file, std::size_t most_at_once,
+                                                    std::vector<std::string>& warnings, std::string& why_not);
+[[nodiscard]] bool is_large_cloud(const std::filesystem::path& file, std::size_t most_at_once);
+
 /// Removes what an earlier run left in the folder of temporary files.
 void remove_left_tiles(const std::filesystem::path& folder);
 /// The folder of a frame's, or of a survey's, temporary files below that of its results.

@@ -266,7 +266,8 @@ class DepthFrames {
     }
 
     [[nodiscard]] library::Source source() const {
-        return {nullptr, listing_, [this](std::size_t index) { return frame(index); }, [this] { return noise(); }};
+        return {nullptr, listing_, [this](std::size_t index) { return frame(index); },
+                [this](const RunSettings& asked, const std::string&) { return beforehand(asked); }};
     }
 
   private:
@@ -300,11 +301,15 @@ class DepthFrames {
         return frame;
     }
 
-    [[nodiscard]] DepthNoise noise() const {
+    [[nodiscard]] library::Beforehand beforehand(const RunSettings& asked) const {
+        std::vector<std::size_t> all(listing_.entries.size());
+        std::iota(all.begin(), all.end(), std::size_t{0});
         std::vector<DepthImage> images;
-        for (const std::size_t index : spread(5, listing_.entries.size()))
-            images.push_back(project(frame(index)));
-        return measure_noise(images);
+        if (asked.depth_noise == "auto" || !asked.gives_radius())
+            for (const std::size_t index : spread(5, all.size()))
+                images.push_back(project(frame(index)));
+        return {look_at(images, asked),
+                findings_about(listing_, all, asked, [this](std::size_t index) { return frame(index); }), false};
     }
 
     scanshade_depth depth_;
@@ -444,7 +449,9 @@ scanshade_status scanshade_compute_frame(scanshade_session* session, const scans
             [frame = frame->frame, own = frame->index, opened = frame->opened](std::size_t index) {
                 return index == own ? frame : opened->capture.load(index, false);
             },
-            [opened = frame->opened] { return opened->noise(); }};
+            [opened = frame->opened](const RunSettings& asked, const std::string& key) {
+                return opened->beforehand(asked, key);
+            }};
         *result = new scanshade_result{
             session->session.compute(source, std::span(&frame->index, 1), wanted_from(outputs)), {}, {}};
     });

@@ -1,15 +1,11 @@
 #include "apps/library/session.h"
 
-#include "apps/doubts/doubts.h"
-#include "apps/run/messages.h"
-#include "apps/walk/frame_images.h"
-#include "apps/walk/frame_steps.h"
-#include "apps/walk/point_clouds.h"
-#include "apps/walk/sequence_order.h"
+#include "apps/frame/frame_images.h"
+#include "apps/frame/frame_steps.h"
+#include "apps/frame/sequence_steps.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
 #include "projection/base/stopwatch.h"
-#include "projection/expected_error.h"
 
 #include <algorithm>
 #include <array>
@@ -69,6 +65,8 @@ std::string Result::info() const {
     for (const FrameRow& row : rows) {
         json frame{{"name", row.name}, {"notes", row.notes}, {"warnings", row.warnings}, {"doubts", row.doubts}};
         frame["coverage"] = row.coverage;
+        frame["mean_visibility"] = std::isfinite(row.mean_visibility) ? json(row.mean_visibility) : json();
+        frame["expected_error"] = std::isfinite(row.expected_error) ? json(row.expected_error) : json();
         frame["ms"] = {
             {"load", row.ms.load}, {"project", row.ms.project}, {"compute", row.ms.compute}, {"attach", row.ms.attach}};
         all["frames"].push_back(std::move(frame));
@@ -76,14 +74,18 @@ std::string Result::info() const {
     return json_line(all);
 }
 
-DepthNoise OpenedCapture::noise() const {
-    const std::lock_guard alone(measuring_);
-    if (!noise_) {
-        std::vector<std::size_t> frames(capture.entries.size());
-        std::iota(frames.begin(), frames.end(), std::size_t{0});
-        noise_ = measure_noise(first_look(capture, frames));
-    }
-    return *noise_;
+const Beforehand& OpenedCapture::beforehand(const RunSettings& asked, const std::string& key) const {
+    const std::lock_guard alone(looking_);
+    if (const auto known = found_.find(key); known != found_.end())
+        return known->second;
+    std::vector<std::size_t> frames(capture.entries.size());
+    std::iota(frames.begin(), frames.end(), std::size_t{0});
+    Beforehand found;
+    LoadedFrames loaded;
+    found.look = look_at(capture, frames, asked, loaded);
+    found.findings = findings_about(capture, frames, asked);
+    found.by_points = computes_points(capture, loaded, cloud_walk_for(asked, found.look));
+    return found_.emplace(key, std::move(found)).first->second;
 }
 
 /// A frame under work, and its values once it is done.
@@ -105,19 +107,19 @@ struct Session::Computed {
 /// Frames of one recording, computed together: one method, leased for all of them.
 class Session::Sequence {
   public:
-    Sequence(Session& session, const Source& source, const BatchOptions& options)
-        : session_(session), source_(source), lease_(session.methods()),
+    Sequence(Session& session, const Source& source, const FrameOptions& options)
+        : session_(session), source_(source), methods_(session.methods(options.radius_m)), lease_(*methods_),
           sequence_(lease_->sequence(options.radius_m, options.noise,
                                      sequence_options(session.asked_.sequences, source.listing, options.radius_m))) {}
 
     [[nodiscard]] bool is_of(const Source& source) const { return source.owner && source_.owner == source.owner; }
 
     /// Loads the frames within reach that are not there yet.
-    void compute(Computed& computed, std::size_t index, const BatchOptions& options, Wanted wanted) {
+    void compute(Computed& computed, std::size_t index, const FrameOptions& options, Wanted wanted) {
         const std::size_t reach = sequence_.reach(), first = index - std::min(index, reach);
         for (std::size_t i = std::max(first, next_); i <= std::min(index + reach, source_.listing.entries.size() - 1);
              ++i)
-            add(i, i == index);
+            add(i, i == index, options);
         const auto ready = frames_.find(index);
         if (ready == frames_.end())
             throw Error("the frame is missing");
@@ -125,13 +127,11 @@ class Session::Sequence {
         computed.work.depth = ready->second.depth;
         computed.row.camera = computed.work.frame.camera;
         describe_frame(computed.work);
-        computed.work.finishers = lease_->finishers();
         sequence_.forget_before(first);
         frames_.erase(frames_.begin(), frames_.lower_bound(first));
         lowest_ = first;
         computed.row.index = index;
-        const double together = compute_in_sequence(computed.work, source_.listing, sequence_);
-        computed.work.errors = lease_->errors(options.noise, together);
+        compute_view(computed.work, *lease_, options.noise, source_.listing, &sequence_);
         if (wanted.normals)
             computed.normals = lease_->normals(computed.work.depth, options.noise).normals;
     }
@@ -146,10 +146,10 @@ class Session::Sequence {
         DepthImage depth;
     };
     /// A neighbour that cannot be read is left out, as the walk does; the frame itself must be there.
-    void add(std::size_t index, bool wanted) {
+    void add(std::size_t index, bool wanted, const FrameOptions& options) {
         try {
             Computed loaded(source_.listing.entries[index]);
-            session_.load(loaded, source_, index);
+            session_.load(loaded, source_, index, options);
             if (loaded.work.by_points)
                 throw Error("a cloud without a view cannot be part of a sequence");
             sequence_.add(index, loaded.work.depth, loaded.work.frame.world_from_camera);
@@ -165,6 +165,7 @@ class Session::Sequence {
 
     Session& session_;
     Source source_;
+    std::shared_ptr<MethodPool> methods_;
     MethodPool::Lease lease_;
     SequenceAo sequence_;
     std::map<std::size_t, Ready> frames_;
@@ -176,7 +177,6 @@ class Session::Sequence {
 Session::Session(const Settings& given) {
     fill(asked_, Purpose::session, given);
     settings_text_ = json_line(values_in_use(asked_));
-    by_rays_ = asked_.chosen_setup().make_for_points() != nullptr;
 }
 
 Session::~Session() = default;
@@ -188,12 +188,10 @@ Workers& Session::workers() {
     return *workers_;
 }
 
-MethodPool& Session::methods() {
+std::shared_ptr<MethodPool> Session::methods(double radius_m) {
     Workers& open = workers();
     const std::lock_guard alone(opening_);
-    if (!methods_)
-        methods_ = open.pool_of(asked_.method, asked_.chosen_setup(), asked_.preparation());
-    return *methods_;
+    return open.pool_of(asked_.method, *asked_.setup_with(radius_m), asked_.preparation());
 }
 
 PointMethod& Session::points() {
@@ -211,47 +209,39 @@ PointMethod& Session::points() {
     return *points_;
 }
 
-BatchOptions Session::options(const DepthNoise& noise, Wanted wanted) const {
-    BatchOptions options;
+FrameOptions Session::options(Wanted wanted) const {
+    FrameOptions options;
     options.outputs.confidence = wanted.confidence;
     options.outputs.shaded = options.outputs.cloud = false;
     options.outputs.format = AoFormat::tiff; // floats
     options.range = asked_.range();
     options.radius_m = asked_.radius_m();
-    options.noise = noise;
-    options.cloud_walk = by_rays_ ? CloudWalk::points : asked_.clouds;
     return options;
 }
 
-DepthNoise Session::noise_of(const Source& source) const {
-    return asked_.depth_noise == "auto" ? source.measure_noise() : noise_from_text(asked_.depth_noise);
+FrameOptions Session::options(const Beforehand& known, Wanted wanted) const {
+    FrameOptions options = this->options(wanted);
+    options.noise = known.look.noise;
+    options.doubts = known.findings.doubts;
+    options.cloud_walk = cloud_walk_for(asked_, known.look);
+    if (!known.by_points)
+        options.radius_m = radius_for(asked_, known.look);
+    return options;
 }
 
-void Session::load(Computed& computed, const Source& source, std::size_t index) const {
+void Session::load(Computed& computed, const Source& source, std::size_t index, const FrameOptions& options) const {
     Stopwatch stopwatch;
     Work& work = computed.work;
     work.frame = source.load(index);
     computed.row.index = index;
     computed.row.ms.load = stopwatch.ms();
     describe_frame(work);
-    const CloudWalk walk = by_rays_ ? CloudWalk::points : asked_.clouds;
-    if (work.frame.cloud && takes_points(work.frame, walk, computed.row.notes)) {
-        work.by_points = true;
+    choose_points_or_view(work, options.cloud_walk);
+    if (work.by_points)
         return;
-    }
     const Stopwatch projecting;
-    prepare_view(work, asked_.range());
+    prepare_view(work, options.range);
     computed.row.ms.project = projecting.ms();
-}
-
-void Session::compute_view(Computed& computed, FrameAo& method, const BatchOptions& options, Wanted wanted) const {
-    const Stopwatch stopwatch;
-    computed.work.finishers = method.finishers();
-    computed.work.errors = method.errors(options.noise);
-    compute_alone(computed.work, method, options.noise);
-    computed.row.ms.compute = stopwatch.ms();
-    if (wanted.normals)
-        computed.normals = method.normals(computed.work.depth, options.noise).normals;
 }
 
 void Session::compute_of_points(Computed& computed) {
@@ -262,32 +252,28 @@ void Session::compute_of_points(Computed& computed) {
     computed.row.ms.compute = stopwatch.ms();
 }
 
-void Session::compute_one(Computed& computed, const Source& source, std::size_t index, const BatchOptions& options,
+void Session::compute_one(Computed& computed, const Source& source, std::size_t index, const FrameOptions& options,
                           Wanted wanted) {
-    load(computed, source, index);
-    if (computed.work.by_points)
+    load(computed, source, index, options);
+    if (computed.work.by_points) {
         compute_of_points(computed);
-    else
-        compute_view(computed, *methods().lease(), options, wanted);
+    } else {
+        const std::shared_ptr<MethodPool> pool = methods(options.radius_m);
+        const MethodPool::Lease method = pool->lease();
+        const Stopwatch stopwatch;
+        compute_view(computed.work, *method, options.noise, source.listing);
+        computed.row.ms.compute = stopwatch.ms();
+        if (wanted.normals)
+            computed.normals = method->normals(computed.work.depth, options.noise).normals;
+    }
     finish_one(computed, options, wanted);
 }
 
-void Session::finish_one(Computed& computed, const BatchOptions& options, Wanted wanted) const {
+void Session::finish_one(Computed& computed, const FrameOptions& options, Wanted wanted) const {
     const Stopwatch stopwatch;
     Work& work = computed.work;
     const Frame& frame = work.frame;
-    computed.row.expected_error = std::numeric_limits<double>::quiet_NaN();
-    if (work.by_points)
-        computed.row.expected_error = work.of_points.expected_error.value_or(computed.row.expected_error);
-    else {
-        (void)finish(work, options, options.outputs);
-        computed.row.expected_error =
-            expected_rms_of(work.depth, work.ao.visibility, options.radius_m, options.noise, work.errors);
-    }
-    computed.row.coverage = work.attached.coverage;
-    computed.row.mean_visibility = work.attached.mean_visibility;
-    std::ranges::move(doubts_about(computed_frame(work), options.radius_m, options.noise),
-                      std::back_inserter(computed.row.doubts));
+    (void)attach_values(work, options, options.outputs);
     const auto values = [&](const Attached& of) {
         return frame.cloud ? of.per_point.empty() ? cv::Mat1f() : on_grid(of.per_point, frame.cloud->grid).clone()
                            : of.visibility;
@@ -311,7 +297,7 @@ void Session::finish_one(Computed& computed, const BatchOptions& options, Wanted
 }
 
 void Session::compute_together(std::deque<Computed>& computed, const Source& source,
-                               std::span<const std::size_t> frames, const BatchOptions& options, Wanted wanted) {
+                               std::span<const std::size_t> frames, const FrameOptions& options, Wanted wanted) {
     const std::lock_guard alone(one_sequence_);
     for (std::size_t i = 0; i < frames.size(); ++i)
         during(fmt::format("frame {}", source.listing.entries[frames[i]].name), [&] {
@@ -327,14 +313,14 @@ void Session::compute_together(std::deque<Computed>& computed, const Source& sou
 }
 
 Result Session::compute(const Source& source, std::span<const std::size_t> frames, Wanted wanted) {
-    const DepthNoise noise = noise_of(source);
-    const BatchOptions how = options(noise, wanted);
+    const Beforehand known = source.look(asked_, settings_text_);
+    const FrameOptions how = options(known, wanted);
     std::deque<Computed> computed;
     for (const std::size_t index : frames)
         computed.emplace_back(source.listing.entries.at(index));
     if (asked_.in_sequence(source.listing)) {
         compute_together(computed, source, frames, how, wanted);
-        return joined(computed, &noise);
+        return about_capture(joined(computed), source.listing, known, how);
     }
     std::vector<std::exception_ptr> failures(frames.size());
     std::atomic<std::size_t> next = 0;
@@ -351,7 +337,7 @@ Result Session::compute(const Source& source, std::span<const std::size_t> frame
     };
     { // as many at once as there are methods; a device waits for no preparation of the next frame
         std::vector<std::jthread> others;
-        const std::size_t at_once = frames.size() > 1 ? methods().size() + 1 : 1;
+        const std::size_t at_once = frames.size() > 1 && !known.by_points ? methods(how.radius_m)->size() + 1 : 1;
         for (std::size_t i = 1; i < std::min(at_once, frames.size()); ++i)
             others.emplace_back(work);
         work();
@@ -359,7 +345,7 @@ Result Session::compute(const Source& source, std::span<const std::size_t> frame
     for (const std::exception_ptr& failure : failures)
         if (failure)
             std::rethrow_exception(failure);
-    return joined(computed, &noise);
+    return about_capture(joined(computed), source.listing, known, how);
 }
 
 Result Session::compute(PointArrays arrays, Wanted wanted) {
@@ -379,13 +365,13 @@ Result Session::compute(PointArrays arrays, Wanted wanted) {
         compute_points(work, method, {points, arrays.normals, arrays.triangles, arrays.z_up}, arrays.scanner);
         one.row.ms.compute = stopwatch.ms();
     }
-    finish_one(one, options({}, wanted), wanted);
-    Result result = joined(computed, nullptr);
+    finish_one(one, options(wanted), wanted);
+    Result result = joined(computed);
     result.about["radius"] = work.of_points.radius;
     return result;
 }
 
-Result Session::joined(std::deque<Computed>& computed, const DepthNoise* noise) const {
+Result Session::joined(std::deque<Computed>& computed) const {
     Result result;
     const cv::Size size = computed.front().visibility.size();
     result.count = static_cast<std::int64_t>(computed.size());
@@ -413,10 +399,16 @@ Result Session::joined(std::deque<Computed>& computed, const DepthNoise* noise) 
         result.rows.push_back(std::move(one.row));
     result.settings = settings_text_;
     result.device = workers_ ? workers_->device().info().name : "the processor";
-    if (noise) {
-        result.about["radius"] = asked_.radius_m();
-        result.about["depth_noise"] = noise_sentence(*noise, asked_);
-    }
+    return result;
+}
+
+Result Session::about_capture(Result result, const Capture& capture, const Beforehand& known,
+                              const FrameOptions& options) const {
+    result.about["radius"] = options.radius_m;
+    result.about["depth_noise"] = noise_sentence(options.noise, asked_, capture.unit);
+    std::vector<std::string> warnings = known.findings.warnings;
+    std::ranges::copy(warnings_about(asked_, known.look, options.radius_m), std::back_inserter(warnings));
+    result.about["warnings"] = std::move(warnings);
     return result;
 }
 

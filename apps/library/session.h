@@ -1,13 +1,15 @@
-// A session computes frames by the steps of the walk, without its files: what the C interface's functions call.
+// A session computes frames by the steps of the walk, without its files, for the functions of the C interface.
 #pragma once
 
+#include "apps/frame/work.h"
 #include "apps/library/settings.h"
-#include "apps/run/workers.h"
-#include "apps/walk/work.h"
+#include "apps/session/capture_look.h"
+#include "apps/session/workers.h"
 #include "io/captures/capture.h"
 
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -30,21 +32,29 @@ struct Result {
     cv::Mat3f normals;                ///< NaN = none; empty = not asked for
     std::vector<FrameRow> rows;
     std::string settings, device;
-    json about; ///< radius, noise
+    json about; ///< radius, noise, warnings about the capture
     /// As scanshade_result_info() has it.
     [[nodiscard]] std::string info() const;
 };
 
-/// A capture, and the noise of its depth, measured once.
+/// What a capture shows before its first frame is computed.
+struct Beforehand {
+    CaptureLook look;
+    CaptureFindings findings;
+    bool by_points = false; ///< computes_points()
+};
+
+/// A capture, and what was found out about it, once for each choice of settings.
 class OpenedCapture {
   public:
     explicit OpenedCapture(Capture listed) : capture(std::move(listed)) {}
-    [[nodiscard]] DepthNoise noise() const;
+    /// `key`: equal for equal settings.
+    [[nodiscard]] const Beforehand& beforehand(const RunSettings& asked, const std::string& key) const;
     const Capture capture;
 
   private:
-    mutable std::mutex measuring_;
-    mutable std::optional<DepthNoise> noise_;
+    mutable std::mutex looking_;
+    mutable std::map<std::string, Beforehand> found_;
 };
 
 /// Where frames come from: a capture, or the caller's arrays.
@@ -52,7 +62,7 @@ struct Source {
     std::shared_ptr<const void> owner;            ///< keeps `listing` alive
     const Capture& listing;                       ///< names and poses of all frames
     std::function<Frame(std::size_t index)> load; ///< safe from several threads
-    std::function<DepthNoise()> measure_noise;
+    std::function<Beforehand(const RunSettings& asked, const std::string& key)> look;
 };
 
 /// Points in memory. Spans are read during the call only.
@@ -79,26 +89,27 @@ class Session {
     class Sequence;
     struct Computed;
     [[nodiscard]] Workers& workers();
-    [[nodiscard]] MethodPool& methods();
+    /// Of the chosen method with that radius.
+    [[nodiscard]] std::shared_ptr<MethodPool> methods(double radius_m);
     [[nodiscard]] PointMethod& points();
-    [[nodiscard]] BatchOptions options(const DepthNoise& noise, Wanted wanted) const;
-    [[nodiscard]] DepthNoise noise_of(const Source& source) const;
-    void compute_view(Computed& computed, FrameAo& method, const BatchOptions& options, Wanted wanted) const;
+    [[nodiscard]] FrameOptions options(Wanted wanted) const;
+    /// Of a capture.
+    [[nodiscard]] FrameOptions options(const Beforehand& known, Wanted wanted) const;
     void compute_of_points(Computed& computed);
-    void load(Computed& computed, const Source& source, std::size_t index) const;
-    void compute_one(Computed& computed, const Source& source, std::size_t index, const BatchOptions& options,
+    void load(Computed& computed, const Source& source, std::size_t index, const FrameOptions& options) const;
+    void compute_one(Computed& computed, const Source& source, std::size_t index, const FrameOptions& options,
                      Wanted wanted);
     void compute_together(std::deque<Computed>& computed, const Source& source, std::span<const std::size_t> frames,
-                          const BatchOptions& options, Wanted wanted);
-    void finish_one(Computed& computed, const BatchOptions& options, Wanted wanted) const;
-    [[nodiscard]] Result joined(std::deque<Computed>& computed, const DepthNoise* noise) const;
+                          const FrameOptions& options, Wanted wanted);
+    void finish_one(Computed& computed, const FrameOptions& options, Wanted wanted) const;
+    [[nodiscard]] Result joined(std::deque<Computed>& computed) const;
+    [[nodiscard]] Result about_capture(Result result, const Capture& capture, const Beforehand& known,
+                                       const FrameOptions& options) const;
 
     RunSettings asked_;
     std::string settings_text_;
-    bool by_rays_; ///< the method needs no view, so that clouds never get one
     std::mutex opening_, one_cloud_, one_sequence_;
     std::unique_ptr<Workers> workers_;
-    std::shared_ptr<MethodPool> methods_;
     std::unique_ptr<PointMethod> points_;
     std::unique_ptr<Sequence> sequence_; ///< of the capture that was computed last
 };

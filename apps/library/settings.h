@@ -4,7 +4,7 @@
 #include "apps/json.h"
 #include "apps/method_settings.h"
 #include "apps/refine/refine.h"
-#include "apps/run/settings.h"
+#include "apps/session/settings.h"
 
 namespace scanshade::library {
 

@@ -1,8 +1,8 @@
 // The page of several captures, made from the rows of their frames.
 #pragma once
 
+#include "apps/frame/frame_row.h"
 #include "apps/page/list_page.h"
-#include "apps/results/frame_row.h"
 
 #include <cstddef>
 #include <filesystem>

@@ -591,10 +591,6 @@ cv::Mat3b both(const cv::Mat3b& first, const cv::Mat3b& second) {
 
 } // namespace
 
-bool has_colours(const Cloud& cloud) {
-    return std::ranges::any_of(cloud.colours, [](const cv::Vec3b& colour) { return colour != cv::Vec3b(); });
-}
-
 Vector3d up_of(const Cloud& cloud, const PointVisibility& found, const std::optional<Vector3d>& viewpoint) {
     constexpr std::size_t enough = 8000;
     const Drawn drawn = some_of(cloud, found, enough);

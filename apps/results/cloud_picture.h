@@ -26,7 +26,4 @@ namespace scanshade {
 
 constexpr std::size_t most_drawn = 400000;
 
-/// Whether the cloud's points have colours of their own: some programs write all of them as zero.
-[[nodiscard]] bool has_colours(const Cloud& cloud);
-
 } // namespace scanshade

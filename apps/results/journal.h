@@ -1,7 +1,7 @@
 // The journal: a line per finished frame, kept with the results. --resume trusts it; `status` and `merge` read it.
 #pragma once
 
-#include "apps/results/frame_row.h"
+#include "apps/frame/frame_row.h"
 #include "apps/results/task_sums.h"
 #include "projection/base/error.h"
 

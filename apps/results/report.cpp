@@ -3,8 +3,8 @@
 
 #include "apps/command_line.h"
 #include "apps/csv.h"
+#include "apps/frame/outputs.h"
 #include "apps/json.h"
-#include "apps/results/outputs.h"
 #include "io/output_file.h"
 
 #include <algorithm>

@@ -3,9 +3,9 @@
 
 #include "ao/gpu/device.h"
 #include "apps/command.h"
+#include "apps/frame/frame_row.h"
 #include "apps/json.h"
 #include "apps/page/run_page.h"
-#include "apps/results/frame_row.h"
 #include "io/captures/capture.h"
 
 #include <chrono>

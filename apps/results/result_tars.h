@@ -1,8 +1,8 @@
 // --tar: the results of every so many frames as one tar, `tars/000000.tar`, in the form that WebDataset reads.
 #pragma once
 
-#include "apps/results/frame_row.h"
-#include "apps/results/outputs.h"
+#include "apps/frame/frame_row.h"
+#include "apps/frame/outputs.h"
 #include "io/output_file.h"
 #include "io/tar_output.h"
 

@@ -2,8 +2,8 @@
 // frames are not read to be counted.
 #pragma once
 
+#include "apps/frame/frame_row.h"
 #include "apps/json.h"
-#include "apps/results/frame_row.h"
 
 #include <cstddef>
 #include <map>

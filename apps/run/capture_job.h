@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/light/light.h"
+#include "apps/session/capture_look.h"
 #include "apps/walk/batch_options.h"
 #include "io/captures/capture.h"
 
@@ -20,10 +21,10 @@ struct OpenedCapture {
     Capture capture;
     std::vector<std::size_t> of; ///< all its frames to compute
     /// Made by the first block that needs them.
-    std::once_flag check_poses, make_key, find_light;
+    std::once_flag check, make_key, find_light;
     std::string task_key = {};
     LightEstimate light = {};
-    std::vector<std::string> doubts = {}; ///< of the capture as a whole
+    CaptureFindings findings = {};
 };
 
 /// One capture, the frames to take of it, and where its results go.
@@ -37,8 +38,7 @@ struct CaptureJob {
     BatchOptions batch = {};  ///< batch.frames may be a block of `of`
     std::string block = {};   ///< "" = all, else as Task::block() says
     LoadedFrames loaded = {}; ///< decoded for the first look; the walk takes them
-    bool as_views = false;    ///< its clouds are noisy images of one camera each, though they have no grid
-    double extent_m = 0;      ///< of its scene: the median of SceneExtent::diagonal_m; 0 = not looked at
+    CaptureLook look = {};
 
     [[nodiscard]] const std::filesystem::path& folder() const { return batch.outputs.folder; }
 };

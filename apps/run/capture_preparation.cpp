@@ -1,4 +1,5 @@
 // What a capture needs before its first frame: noise, method, budget, light, and the head of its report.
+#include "apps/measure/front/budget.h"
 #include "apps/measure/front/front.h"
 #include "apps/measure/trials/trial.h"
 #include "apps/run/capture_runs.h"
@@ -30,53 +31,6 @@ gpu::DeviceInfo the_processor() {
     return info;
 }
 
-/// Whether the capture holds clouds that are computed from their points. Judged by the clouds in memory; those that
-/// were not kept have no grid, or the noise was not measured.
-bool computes_points(const CaptureJob& job) {
-    const Capture& capture = job.capture;
-    if (capture.camera && job.batch.cloud_walk != CloudWalk::points)
-        return false;
-    std::vector<std::string> unused;
-    return std::ranges::none_of(capture.entries, [](const auto& entry) { return entry.cloud.empty(); }) &&
-           job.batch.cloud_walk != CloudWalk::view && std::ranges::all_of(job.loaded, [&](const auto& each) {
-               return takes_points(each.second.frame, job.batch.cloud_walk, unused);
-           });
-}
-
-/// The middle one of the views' extents; 0 where none shows anything.
-double typical_extent(std::span<const DepthImage> views) {
-    std::vector<double> extents;
-    for (const DepthImage& view : views)
-        if (const SceneExtent scene = scene_extent(view); scene.diagonal_m > 0)
-            extents.push_back(scene.diagonal_m);
-    return median(std::move(extents), 0);
-}
-
-/// A radius of half the scene looks mostly at what no view shows (doubts/of_view.cpp). Near that, since views differ,
-/// it is the longest of 0.2, 0.1, 0.05, 0.02 ... m that is no more than a quarter of the scene: few values, so that
-/// captures of one thing share theirs.
-double suited_radius(double usual, double extent) {
-    constexpr double least_radii = 2.5, least_scene_m = 0.02; // smaller ones are in a wrong unit
-    if (extent >= least_radii * usual || extent < least_scene_m)
-        return usual;
-    const double most = extent / 4, decade = std::pow(10, std::floor(std::log10(most)));
-    const double step = most >= 5 * decade ? 5 : most >= 2 * decade ? 2 : 1;
-    return std::min(usual, step * decade);
-}
-
-/// Clouds without a grid that one camera took each, and noisy: rays from such points read far walls as closed.
-void settle_views(CaptureJob& job, std::span<const DepthImage> seen) {
-    const bool no_grid = std::ranges::none_of(job.loaded, [](const auto& each) {
-        return !each.second.frame.cloud || each.second.frame.cloud->organised() ||
-               each.second.frame.camera.pinhole.fx != 0;
-    });
-    if (!no_grid || std::ranges::any_of(seen, [](const DepthImage& view) { return view.z_m.empty(); }))
-        return;
-    job.as_views = job.batch.noise.any();
-    if (!job.as_views)
-        job.batch.noise = {};
-}
-
 Workers* without_workers(std::string& why_none) {
     why_none = "no device was opened: no GPU, and only points to compute";
     return nullptr;
@@ -85,41 +39,20 @@ Workers* without_workers(std::string& why_none) {
 } // namespace
 
 void CaptureRuns::look_at(CaptureJob& job) const {
-    const bool measures_noise = asked_.depth_noise == "auto";
-    if (!measures_noise)
-        job.batch.noise = noise_from_text(asked_.depth_noise);
-    const bool images = std::ranges::all_of(job.capture.entries, [](const auto& entry) { return entry.cloud.empty(); });
-    if (!measures_noise && (!images || asked_.gives_radius()))
-        return;
     const bool colour = shows_colour(job.batch.outputs, !asked_.recording_cloud.empty() || job.batch.outputs.mcap);
-    const bool by_points = asked_.clouds != CloudWalk::view && !job.capture.camera;
-    const std::vector<DepthImage> seen =
-        first_look(job.capture, job.of, &job.loaded, colour,
-                   by_points ? CloudAo(asked_.cloud_ao()).most_at_once() : std::numeric_limits<std::size_t>::max(),
-                   measures_noise && asked_.clouds != CloudWalk::points);
-    if (measures_noise)
-        job.batch.noise = measure_noise(seen);
-    if (by_points && measures_noise && !images && asked_.clouds == CloudWalk::automatic)
-        settle_views(job, seen);
-    if (!job.capture.unit.arbitrary())
-        job.extent_m = typical_extent(seen);
+    job.look = scanshade::look_at(job.capture, job.of, asked_, job.loaded, colour);
     const std::set<std::size_t> wanted(job.batch.frames.begin(), job.batch.frames.end());
     std::erase_if(job.loaded, [&](const auto& each) { return !wanted.contains(each.first); });
     job.batch.loaded = &job.loaded;
-}
-
-double CaptureRuns::radius_for(const CaptureJob& job) const {
-    const double usual = asked_.radius_m();
-    return asked_.gives_radius() || !(job.extent_m > 0) ? usual : suited_radius(usual, job.extent_m);
 }
 
 CaptureRuns::Prepared CaptureRuns::prepare(CaptureJob& job) {
     const std::lock_guard alone(alone_);
     const bool needs_no_view = asked_.chosen_setup().make_for_points() != nullptr;
     job.batch.cloud_tiles = asked_.cloud_tiles;
-    job.as_views = job.as_views && !needs_no_view;
-    job.batch.cloud_walk = needs_no_view ? CloudWalk::points : job.as_views ? CloudWalk::view : asked_.clouds;
-    const bool by_points = computes_points(job);
+    job.batch.noise = job.look.noise;
+    job.batch.cloud_walk = cloud_walk_for(asked_, job.look);
+    const bool by_points = computes_points(job.capture, job.loaded, job.batch.cloud_walk);
     const bool no_device = by_points && !asked_.asks_for_device(job.capture);
     Workers* workers = no_device && !workers_ && !gpu::may_have_gpu() && all_by_points(job)
                            ? without_workers(job.batch.no_method)
@@ -128,23 +61,16 @@ CaptureRuns::Prepared CaptureRuns::prepare(CaptureJob& job) {
     std::vector<std::string> budget;
     if (asked_.budget.any())
         budget = keep_to_budget(job, workers->device());
-    job.batch.radius_m = by_points ? asked_.radius_m() : radius_for(job);
+    job.batch.radius_m = by_points ? asked_.radius_m() : radius_for(asked_, job.look);
     std::unique_ptr<MethodSetup> setup = asked_.setup_with(job.batch.radius_m);
     std::shared_ptr<MethodPool> methods =
         workers ? workers->pool_of(asked_.method, *setup, asked_.preparation()) : nullptr;
     gpu::Device* gpu = workers && !gpu::is_cpu(workers->device().info()) ? &workers->device() : nullptr;
     auto points = point_method(*setup, asked_.cloud_ao(), gpu);
     job.batch.points = points.get();
-    const auto warn_once = [&](std::string warning) { // for all blocks
-        if (!std::ranges::count(job.capture.warnings, warning))
+    for (std::string& warning : warnings_about(asked_, job.look, job.batch.radius_m))
+        if (!std::ranges::count(job.capture.warnings, warning)) // once for all blocks
             job.capture.warnings.push_back(std::move(warning));
-    };
-    if (job.batch.radius_m != asked_.radius_m())
-        warn_once(small_scene_warning(job));
-    if (job.as_views)
-        warn_once(
-            "points seen by one camera at the origin, with a depth sensor's noise: they are computed as its image. "
-            "--clouds points casts rays from every point.");
     RunReport report = begun_report(job, workers, *setup);
     report.budget = budget;
     const std::string light = take_light(job, report, by_points ? nullptr : methods.get());
@@ -190,7 +116,7 @@ std::vector<std::string> CaptureRuns::keep_to_budget(const CaptureJob& job, gpu:
     request.leave_bad_out = true;
     request.preparation = asked_.preparation();
     const TrialCapture trial = load_trial(job.capture, job.batch.noise, noise_origin(asked_), request);
-    const Choice choice = choose(device, shipped_front(), trial, radius_for(job), asked_.budget);
+    const Choice choice = choose(device, shipped_front(), trial, radius_for(asked_, job.look), asked_.budget);
     asked_.choose(choice.configuration);
     return choice.sentences;
 }

@@ -1,6 +1,6 @@
 #include "apps/run/capture_runs.h"
 
-#include "apps/doubts/pose_check.h"
+#include "apps/frame/sequence_steps.h"
 #include "apps/measure/front/front.h"
 #include "apps/page/run_page.h"
 #include "apps/results/mcap_recording.h"
@@ -10,7 +10,6 @@
 #include "apps/walk/batch.h"
 #include "apps/walk/large_frames.h"
 #include "apps/walk/progress.h"
-#include "apps/walk/sequence_order.h"
 #include "io/files.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -117,17 +116,11 @@ std::vector<FrameRow> CaptureRuns::process(CaptureJob job, OrderedOutput& output
     if (auto rows = rows_if_done(job, journal, task, files))
         return *std::move(rows);
     look_at(job);
-    std::call_once(job.opened->check_poses, [&] {
-        if (const PoseCheck poses = check_poses(job.capture, job.of); !poses.warning.empty()) {
-            job.capture.warnings.push_back(poses.warning);
-            if (poses.doubts_depths)
-                job.opened->doubts.push_back(poses.warning);
-        }
-        if (asked_.sequence == SequenceUse::on && !asked_.in_sequence(job.capture))
-            job.capture.warnings.emplace_back(
-                "--sequence on: fewer than two frames have a pose, so each is computed by itself.");
+    std::call_once(job.opened->check, [&] {
+        job.opened->findings = findings_about(job.capture, job.of, asked_);
+        std::ranges::copy(job.opened->findings.warnings, std::back_inserter(job.capture.warnings));
     });
-    job.batch.doubts = job.opened->doubts;
+    job.batch.doubts = job.opened->findings.doubts;
 
     Prepared ready = prepare(job);
     std::optional<RecordingCloud> cloud;

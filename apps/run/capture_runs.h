@@ -1,14 +1,14 @@
 // Captures of a run, each from its journal to its report. They share settings, devices and the way into the walk.
 #pragma once
 
+#include "apps/frame/point_clouds.h"
 #include "apps/jobs/worker.h"
 #include "apps/results/journal.h"
 #include "apps/results/report.h"
 #include "apps/run/capture_job.h"
-#include "apps/run/settings.h"
-#include "apps/run/workers.h"
+#include "apps/session/settings.h"
+#include "apps/session/workers.h"
 #include "apps/walk/overlap.h"
-#include "apps/walk/point_clouds.h"
 #include "apps/walk/resume.h"
 
 #include <atomic>
@@ -86,8 +86,6 @@ class CaptureRuns {
     /// Measures noise and extent on frames spread over the whole capture, so that its blocks agree. Frames of this
     /// block stay in memory.
     void look_at(CaptureJob& job) const;
-    /// The radius that was set; where none was, and the scene is too small for the usual one, a radius that suits it.
-    [[nodiscard]] double radius_for(const CaptureJob& job) const;
     /// Makes the methods, or keeps those of the last capture. Without a Vulkan device, clouds are computed from their
     /// points on the processor.
     [[nodiscard]] Prepared prepare(CaptureJob& job);

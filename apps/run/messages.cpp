@@ -45,17 +45,6 @@ std::string shading_sentence(const Capture& capture, Registration registration, 
         why, capture.registration_reason.empty() ? "" : " (" + capture.registration_reason + ")");
 }
 
-std::string small_scene_warning(const CaptureJob& job) {
-    return fmt::format(
-        "the scene is only {:.2g} m large, so the radius is {} m; --radius sets another. If the scene is "
-        "larger, check the depth unit.",
-        job.extent_m, job.batch.radius_m);
-}
-
-std::string noise_origin(const RunSettings& settings) {
-    return settings.depth_noise == "auto" ? "measured" : "--depth-noise";
-}
-
 std::string radius_sentence(const RunSettings& settings, const CaptureJob& job) {
     const Capture& capture = job.capture;
     if (!capture.unit.arbitrary())
@@ -68,16 +57,6 @@ std::string radius_sentence(const RunSettings& settings, const CaptureJob& job) 
     return fmt::format("{}, {:.3g} of the median depth of {}; the recording's unit is arbitrary",
                        capture.unit.text(radius), radius / capture.median_depth,
                        capture.unit.text(capture.median_depth));
-}
-
-std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings, const LengthUnit& unit) {
-    const std::string origin = noise_origin(settings);
-    const std::string flying = !noise.flies()         ? ""
-                               : settings.drop_flying ? "flying pixels are dropped; "
-                                                      : "flying pixels are kept; ";
-    const bool planes = noise.any() && settings.depth_smoothing > 0;
-    return fmt::format("{} ({}); {}{}", describe(noise, unit), origin, flying,
-                       planes ? "depth and normals come from plane fits" : "depth is used as recorded");
 }
 
 void introduce(const RunReport& report, std::size_t frames, bool by_points) {

@@ -3,7 +3,7 @@
 
 #include "apps/results/report.h"
 #include "apps/run/capture_job.h"
-#include "apps/run/settings.h"
+#include "apps/session/settings.h"
 
 #include <filesystem>
 #include <string>
@@ -13,15 +13,8 @@ namespace scanshade {
 /// What the shaded pictures show, and which flag changes that.
 [[nodiscard]] std::string shading_sentence(const Capture& capture, Registration registration,
                                            Shade shade = Shade::multiply);
-/// Who gave the noise of the depth: "measured", or the flag.
-/// Of a capture whose radius is not the usual one.
-[[nodiscard]] std::string small_scene_warning(const CaptureJob& job);
-[[nodiscard]] std::string noise_origin(const RunSettings& settings);
 /// "0.23 units, 0.1 of the median depth of 2.3 units; the recording's unit is arbitrary"; empty where it is metres.
 [[nodiscard]] std::string radius_sentence(const RunSettings& settings, const CaptureJob& job);
-/// The depth's noise, in metres or the capture's unit, and how the depth is prepared.
-[[nodiscard]] std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings,
-                                         const LengthUnit& unit = {});
 
 /// Prints what the capture holds, how many frames are used, and the settings chosen for them. `by_points`: its clouds
 /// are computed from their points, so that depth images do not matter.

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/run/capture_job.h"
-#include "apps/run/settings.h"
+#include "apps/session/settings.h"
 
 #include <filesystem>
 #include <memory>

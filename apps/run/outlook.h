@@ -1,9 +1,9 @@
 // The last messages of a run: the expected error of its results, and the cost of a better preset.
 #pragma once
 
+#include "apps/frame/frame_row.h"
 #include "apps/measure/front/front.h"
-#include "apps/results/frame_row.h"
-#include "apps/run/settings.h"
+#include "apps/session/settings.h"
 
 #include <string>
 #include <vector>

@@ -1,7 +1,7 @@
 // The results of all frames of a run, counted for its last line and its exit code.
 #pragma once
 
-#include "apps/results/frame_row.h"
+#include "apps/frame/frame_row.h"
 
 #include <cstddef>
 #include <set>

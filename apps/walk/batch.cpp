@@ -1,17 +1,14 @@
 // The walk for many frames: load, project, compute, attach, write, with a bounded number of frames in memory.
 #include "apps/walk/batch.h"
 
-#include "apps/doubts/doubts.h"
+#include "apps/frame/frame_steps.h"
 #include "apps/walk/frame_files.h"
 #include "apps/walk/frame_messages.h"
-#include "apps/walk/frame_steps.h"
 #include "apps/walk/large_frames.h"
-#include "apps/walk/point_clouds.h"
 #include "apps/walk/sequence_order.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
 #include "projection/base/stopwatch.h"
-#include "projection/expected_error.h"
 
 #include <algorithm>
 #include <exception>
@@ -83,17 +80,8 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         outputs.cloud = false; // what follows shows a part of it
     }
     take(work, &StageTimes::attach, [&] {
-        if (!by_points)
-            images = finish(work, options, options.recording ? with_messages(outputs) : outputs);
-        work.row.coverage = work.attached.coverage;
-        work.row.mean_visibility = work.attached.mean_visibility;
-        work.row.expected_error = work.by_points ? work.of_points.expected_error.value_or(std::nan(""))
-                                                 : expected_rms_of(work.depth, work.ao.visibility, options.radius_m,
-                                                                   options.noise, work.errors);
-        std::ranges::move(doubts_about(computed_frame(work), options.radius_m, options.noise, options.outputs.unit),
-                          std::back_inserter(work.row.doubts));
-        if (!by_points)
-            std::ranges::copy(options.doubts, std::back_inserter(work.row.doubts));
+        images = attach_values(work, options, options.recording && !by_points ? with_messages(outputs) : outputs,
+                               options.cloud != nullptr);
     });
     take(work, &StageTimes::write, [&] {
         if (by_points) {
@@ -211,8 +199,8 @@ class Pipeline {
         if (work->large)
             return work;
         work->row.ms.load += work->loaded_in_ms;
-        if (work->row.status != FrameStatus::failed && work->frame.cloud && options_.points)
-            work->by_points = takes_points(work->frame, options_.cloud_walk, work->row.notes);
+        if (work->row.status != FrameStatus::failed && options_.points)
+            choose_points_or_view(*work, options_.cloud_walk);
         if (work->by_points) {
             work->row.ms.project = 0;
             return work;
@@ -240,8 +228,12 @@ class Pipeline {
             const MethodPool::Lease method = pool_.lease();
             // Isolated: some methods use all cores. A frame begun while this one waits for them would wait for a
             // method.
-            tbb::this_task_arena::isolate(
-                [&] { take(*work, &StageTimes::compute, [&] { compute_view(*work, *method); }); });
+            tbb::this_task_arena::isolate([&] {
+                take(*work, &StageTimes::compute, [&] {
+                    compute_view(*work, *method, options_.noise, capture_, options_.sequence);
+                    dump(*work, *method);
+                });
+            });
         }
         if (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage)
             given_up_ = true;
@@ -283,15 +275,7 @@ class Pipeline {
         work.row.warnings = std::move(warnings);
     }
 
-    void compute_view(Work& work, FrameAo& method) const {
-        work.finishers = method.finishers();
-        double together = 0;
-        if (options_.sequence) {
-            together = compute_in_sequence(work, capture_, *options_.sequence);
-        } else {
-            compute_alone(work, method, options_.noise);
-        }
-        work.errors = method.errors(options_.noise, together);
+    void dump(const Work& work, FrameAo& method) const {
         if (options_.dump.empty())
             return;
         std::vector<Intermediate> all = method.intermediates();

@@ -1,9 +1,9 @@
 // The walk for many frames: load, project, compute, attach, write, with a bounded number of frames in memory.
 #pragma once
 
-#include "apps/results/frame_row.h"
+#include "apps/frame/frame_row.h"
+#include "apps/frame/method_pool.h"
 #include "apps/walk/batch_options.h"
-#include "apps/walk/method_pool.h"
 
 namespace scanshade {
 

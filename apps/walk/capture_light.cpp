@@ -1,9 +1,9 @@
 #include "apps/walk/capture_light.h"
 
+#include "apps/frame/first_look.h"
+#include "apps/frame/frame_images.h"
+#include "apps/frame/frame_steps.h"
 #include "apps/json.h"
-#include "apps/walk/first_look.h"
-#include "apps/walk/frame_images.h"
-#include "apps/walk/frame_steps.h"
 #include "io/text.h"
 #include "projection/attach.h"
 #include "projection/base/error.h"
@@ -42,7 +42,7 @@ bool add_frame(LightSamples& samples, const Capture& capture, std::size_t index,
     if (work.frame.cloud && !work.frame.cloud->organised())
         return false;
     prepare_view(work, options.range);
-    compute_alone(work, method, options.noise);
+    compute_view(work, method, options.noise, capture);
     work.attached = attach(work.frame, work.depth, work.ao);
     const Scene scene = scene_of(work, false);
     if (scene.colour.empty() || scene.colour.size() != work.depth.z_m.size())

@@ -1,12 +1,12 @@
 // The last step of the walk: a frame's pictures and files.
 #include "apps/walk/frame_files.h"
 
+#include "apps/frame/frame_points.h"
+#include "apps/frame/point_clouds.h"
 #include "apps/page/points.h"
 #include "apps/page/preview.h"
 #include "apps/picture.h"
 #include "apps/results/cloud_picture.h"
-#include "apps/walk/frame_points.h"
-#include "apps/walk/point_clouds.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/glb.h"
 #include "io/images/npy_file.h"

@@ -1,7 +1,7 @@
 // The last step of the walk: a frame's pictures and files.
 #pragma once
 
-#include "apps/walk/frame_images.h"
+#include "apps/frame/frame_images.h"
 
 namespace scanshade {
 

@@ -1,8 +1,8 @@
 #include "apps/walk/frame_messages.h"
 
+#include "apps/frame/frame_points.h"
+#include "apps/frame/outputs.h"
 #include "apps/json.h"
-#include "apps/results/outputs.h"
-#include "apps/walk/frame_points.h"
 #include "io/captures/recordings/ros/message_output.h"
 #include "io/images/image_file.h"
 #include "io/images/png_output.h"

@@ -1,8 +1,8 @@
 // A computed frame as messages of ROS, for run.mcap.
 #pragma once
 
+#include "apps/frame/frame_images.h"
 #include "apps/results/mcap_recording.h"
-#include "apps/walk/frame_images.h"
 
 #include <string>
 

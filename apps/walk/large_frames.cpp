@@ -1,7 +1,7 @@
 #include "apps/walk/large_frames.h"
 
+#include "apps/frame/frame_points.h"
 #include "apps/large/survey.h"
-#include "apps/walk/frame_points.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/format.h"
 #include "projection/base/error.h"
@@ -18,33 +18,6 @@
 #include <thread>
 
 namespace scanshade {
-
-namespace {
-
-/// The shape of a file that is large; nothing for all others.
-std::optional<CloudShape> large_shape(const std::filesystem::path& file, std::size_t most_at_once,
-                                      std::vector<std::string>& warnings, std::string& why_not) {
-    try {
-        std::optional<CloudShape> shape = cloud_shape(file, warnings);
-        if (!shape || shape->records.point_count <= most_at_once || shape->records.grid.height > 1)
-            return std::nullopt;
-        if (shape->whole_since.empty())
-            return shape;
-        why_not = shape->whole_since;
-    } catch (const Outage&) {
-        throw;
-    } catch (const Error&) { // loading it reports the error
-    }
-    return std::nullopt;
-}
-
-} // namespace
-
-bool is_large_cloud(const std::filesystem::path& file, std::size_t most_at_once) {
-    std::vector<std::string> warnings;
-    std::string why_not;
-    return large_shape(file, most_at_once, warnings, why_not).has_value();
-}
 
 LargeSettings LargeFrames::settings(const std::string& name) const {
     LargeSettings settings;

@@ -1,8 +1,8 @@
 // Which clouds of a capture are computed without being in memory as a whole, and their steps of the walk.
 #pragma once
 
+#include "apps/frame/work.h"
 #include "apps/large/large_cloud_run.h"
-#include "apps/walk/work.h"
 
 #include <functional>
 #include <map>
@@ -41,10 +41,6 @@ class LargeFrames {
     std::map<std::size_t, Part> parts_; ///< of surveys, by frame
     std::map<std::size_t, std::string> notes_;
 };
-
-/// Whether a cloud in `file` is computed from its points, has more of them than `most_at_once`, and can be read in
-/// blocks. False for what cannot be read: loading it says why.
-[[nodiscard]] bool is_large_cloud(const std::filesystem::path& file, std::size_t most_at_once);
 
 /// Computes tiles of the large clouds among options.frames for the process that computes these, while it is `at_work`.
 /// Nothing where none of them is large.

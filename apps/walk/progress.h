@@ -2,7 +2,7 @@
 // few seconds, and one for each failed frame.
 #pragma once
 
-#include "apps/results/frame_row.h"
+#include "apps/frame/frame_row.h"
 #include "projection/base/stopwatch.h"
 
 #include <memory>

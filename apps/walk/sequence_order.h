@@ -1,7 +1,7 @@
 // The order in which frames enter the walk. In a sequence, each frame is computed after its neighbours have arrived.
 #pragma once
 
-#include "apps/walk/work.h"
+#include "apps/frame/work.h"
 
 #include <cstddef>
 #include <deque>
@@ -48,12 +48,5 @@ class SequenceBuffer {
     std::deque<WorkPtr> queue_;
     std::vector<std::pair<std::size_t, std::string>> lost_; ///< frames lost to an outage, and why
 };
-
-/// The options asked for. A reach that is not given follows from the capture's poses.
-[[nodiscard]] SequenceAoOptions sequence_options(SequenceAoOptions asked, const Capture& capture, double radius_m);
-
-/// Computes a frame's visibility with its neighbours. The row's notes list the neighbours used, and those left out with
-/// the reason. Returns what share of the usual gain these bring (share_of_gain()).
-[[nodiscard]] double compute_in_sequence(Work& work, const Capture& capture, SequenceAo& sequence);
 
 } // namespace scanshade

@@ -1,8 +1,8 @@
 // The walk with a method that needs no GPU: order, failures, interruption, and what is written.
 #include "apps/walk/batch.h"
 
+#include "apps/frame/frame_images.h"
 #include "apps/results/report.h"
-#include "apps/walk/frame_images.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
 #include "projection/base/stopwatch.h"

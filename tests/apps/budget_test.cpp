@@ -2,7 +2,7 @@
 #include "apps/measure/front/budget.h"
 #include "apps/measure/front/front.h"
 #include "apps/measure/trials/configurations.h"
-#include "apps/run/presets.h"
+#include "apps/session/presets.h"
 #include "tests/support/measured.h"
 #include "tests/support/says.h"
 

@@ -1,6 +1,6 @@
 // A result that is implausible is doubtful, with reasons, wherever the result is told; a plausible one is not.
+#include "apps/frame/frame_steps.h"
 #include "apps/walk/batch.h"
-#include "apps/walk/work.h"
 #include "io/cameras/camera_file.h"
 #include "io/images/image_file.h"
 #include "tests/support/files.h"

@@ -1,6 +1,6 @@
 // Frames computed at once on one device: the same bytes as one after the other, and nothing for Vulkan's
 // validation layer to say.
-#include "apps/run/workers.h"
+#include "apps/session/workers.h"
 
 #include "apps/results/report.h"
 #include "apps/walk/batch.h"

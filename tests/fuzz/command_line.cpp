@@ -1,7 +1,7 @@
 // Fuzz target: the command line. A line for each word, the command first; behind "=====" a file that --settings may
 // name. Nothing is run: words and flags become settings, and these must say again what was understood.
 #include "apps/command_parser.h"
-#include "apps/run/settings.h"
+#include "apps/session/settings.h"
 #include "tests/fuzz/fuzz.h"
 
 #include <array>

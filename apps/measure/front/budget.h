@@ -2,18 +2,12 @@
 #pragma once
 
 #include "apps/measure/front/front.h"
+#include "apps/session/limits.h"
 
 #include <string>
 #include <vector>
 
 namespace scanshade {
-
-/// 0 = no limit.
-struct Budget {
-    double max_error = 0; ///< RMSE to truth
-    double max_ms = 0;    ///< per frame on the device, transfers left out
-    [[nodiscard]] bool any() const { return max_error > 0 || max_ms > 0; }
-};
 
 /// The index of the best point within the budget: the most accurate one within max_ms; without max_ms the cheapest one
 /// within max_error. `ms` is each point's expected time. Throws Misuse, naming the fastest and the most accurate point,

@@ -1,7 +1,7 @@
 // The points of a computed frame with their values, as clouds in files and messages hold them.
 #pragma once
 
-#include "apps/walk/frame_images.h"
+#include "apps/frame/frame_images.h"
 
 #include <Eigen/Core>
 #include <span>

@@ -1,8 +1,7 @@
 // After a frame is computed: values on the recorded pixels or points, confidence, maps and pictures.
-#include "apps/walk/frame_images.h"
+#include "apps/frame/frame_images.h"
 
 #include "apps/picture.h"
-#include "apps/results/cloud_picture.h"
 #include "projection/colour_view.h"
 #include "projection/expected_error.h"
 
@@ -70,13 +69,13 @@ Finished finished(Work& work, const FinishInput& input, const FinishOutputs& out
     return made;
 }
 
-bool wants_confidence(const Work& work, const BatchOptions& options, const Outputs& outputs) {
-    return options.cloud || outputs.confidence || outputs.error ||
-           (work.frame.cloud ? outputs.cloud : outputs.depth_cloud) || outputs.glb;
+bool wants_confidence(const Work& work, const Outputs& outputs) {
+    return outputs.confidence || outputs.error || (work.frame.cloud ? outputs.cloud : outputs.depth_cloud) ||
+           outputs.glb;
 }
 
 /// The light as the camera of that scene sees it.
-std::optional<shared::LightConstants> light_on(const Work& work, const BatchOptions& options, bool colour_view) {
+std::optional<shared::LightConstants> light_on(const Work& work, const FrameOptions& options, bool colour_view) {
     if (!options.light)
         return std::nullopt;
     Eigen::Isometry3d world_from_camera = work.frame.world_from_camera.value_or(Eigen::Isometry3d::Identity());
@@ -94,7 +93,7 @@ std::optional<shared::LightConstants> light_on(const Work& work, const BatchOpti
 }
 
 /// Sentences for what a frame could not be given.
-void warn_of_light(Work& work, const BatchOptions& options, const Outputs& outputs, const Scene& scene) {
+void warn_of_light(Work& work, const FrameOptions& options, const Outputs& outputs, const Scene& scene) {
     const bool divided = outputs.unshaded || outputs.light || outputs.indirect;
     if (scene.colour.empty() && (divided || (outputs.shade == Shade::ambient && (outputs.shaded || outputs.panel))))
         work.row.warnings.push_back(
@@ -140,9 +139,9 @@ Scene scene_of(const Work& work, bool colour_view) {
     return {depth_on_grid(cloud), visibility, colour, frame.camera.pinhole};
 }
 
-FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outputs) {
+FrameImages finish(Work& work, const FrameOptions& options, const Outputs& outputs, bool every_error) {
     work.attached = attach(work.frame, work.depth, work.ao);
-    const bool confidence = wants_confidence(work, options, outputs);
+    const bool confidence = every_error || wants_confidence(work, outputs);
     const FinishInput view{.camera = work.depth.camera,
                            .z_m = work.depth.z_m,
                            .visibility = work.ao.visibility,
@@ -187,8 +186,8 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
         input.light = light_on(work, options, outputs.colour_view);
         warn_of_light(work, options, outputs, images.scene);
         made.confidence_bits = outputs.confidence && !is_float(outputs.format) ? 8 : 0;
-        made.error = confidence && (made.confidence_bits == 0 || outputs.error || options.cloud ||
-                                    outputs.depth_cloud || outputs.glb);
+        made.error = confidence &&
+                     (made.confidence_bits == 0 || outputs.error || every_error || outputs.depth_cloud || outputs.glb);
         Finished all = finished(work, input, made);
         work.error_in_view = work.error.visibility = all.error;
         work.confidence_in_view = work.confidence.visibility = confidence_from(all.error);

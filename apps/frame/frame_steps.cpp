@@ -1,12 +1,14 @@
-#include "apps/walk/frame_steps.h"
+#include "apps/frame/frame_steps.h"
 
-#include "apps/walk/point_clouds.h"
+#include "apps/frame/point_clouds.h"
+#include "apps/frame/sequence_steps.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
 #include "projection/expected_error.h"
 #include "projection/project.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <iterator>
@@ -69,6 +71,15 @@ void take_points(Work& work, PointVisibility found) {
     work.attached = attached_points(*work.frame.cloud, work.of_points.visibility);
 }
 
+void compute_alone(Work& work, FrameAo& method, const DepthNoise& noise) {
+    work.ao = method.compute(work.depth, noise);
+    work.fitted = method.fitted_depth();
+    work.fitted_normals = method.fitted_normals();
+    work.row.passes = method.timings();
+    std::ranges::copy(method.doubts(), std::back_inserter(work.row.doubts));
+    std::ranges::copy(method.warnings(), std::back_inserter(work.row.warnings));
+}
+
 } // namespace
 
 void describe_frame(Work& work) {
@@ -83,19 +94,24 @@ void describe_frame(Work& work) {
                                            frame.colour.rows, frame.depth_m.cols, frame.depth_m.rows));
 }
 
+void choose_points_or_view(Work& work, CloudWalk walk) {
+    work.by_points = work.frame.cloud && takes_points(work.frame, walk, work.row.notes);
+}
+
 void prepare_view(Work& work, const ProjectOptions& range) {
     work.frame.camera = work.row.camera = camera_of(work.frame);
     work.depth = project(work.frame, range);
     refuse_blind_view(work, range);
 }
 
-void compute_alone(Work& work, FrameAo& method, const DepthNoise& noise) {
-    work.ao = method.compute(work.depth, noise);
-    work.fitted = method.fitted_depth();
-    work.fitted_normals = method.fitted_normals();
-    work.row.passes = method.timings();
-    std::ranges::copy(method.doubts(), std::back_inserter(work.row.doubts));
-    std::ranges::copy(method.warnings(), std::back_inserter(work.row.warnings));
+void compute_view(Work& work, FrameAo& method, const DepthNoise& noise, const Capture& capture, SequenceAo* sequence) {
+    work.finishers = method.finishers();
+    double gain = 0;
+    if (sequence)
+        gain = compute_in_sequence(work, capture, *sequence);
+    else
+        compute_alone(work, method, noise);
+    work.errors = method.errors(noise, gain);
 }
 
 void compute_points(Work& work, PointMethod& points) {
@@ -107,6 +123,35 @@ void compute_points(Work& work, PointMethod& points, const PointSet& set,
                     const std::optional<Eigen::Vector3d>& scanner) {
     require_memory_for(*work.frame.cloud);
     take_points(work, points.compute(set, scanner));
+}
+
+ComputedFrame computed_frame(const Work& work) {
+    return {work.frame,
+            work.row.camera,
+            work.row.valid_share,
+            work.row.coverage,
+            work.depth,
+            work.ao.visibility,
+            work.by_points ? &work.of_points : nullptr};
+}
+
+FrameImages attach_values(Work& work, const FrameOptions& options, const Outputs& outputs, bool every_error) {
+    FrameImages images;
+    FrameRow& row = work.row;
+    if (work.by_points) {
+        row.expected_error = work.of_points.expected_error.value_or(std::nan(""));
+    } else {
+        images = finish(work, options, outputs, every_error);
+        row.expected_error =
+            expected_rms_of(work.depth, work.ao.visibility, options.radius_m, options.noise, work.errors);
+    }
+    row.coverage = work.attached.coverage;
+    row.mean_visibility = work.attached.mean_visibility;
+    std::ranges::move(doubts_about(computed_frame(work), options.radius_m, options.noise, options.outputs.unit),
+                      std::back_inserter(row.doubts));
+    if (!work.by_points)
+        std::ranges::copy(options.doubts, std::back_inserter(row.doubts));
+    return images;
 }
 
 } // namespace scanshade

@@ -1,5 +1,5 @@
 // The settings of `scanshade run`, and the options of the walk that follow from them.
-#include "apps/run/settings.h"
+#include "apps/session/settings.h"
 
 #include "ao/cloud/cloud_ao.h"
 #include "apps/method_settings.h"

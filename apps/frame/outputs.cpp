@@ -1,4 +1,4 @@
-#include "apps/results/outputs.h"
+#include "apps/frame/outputs.h"
 
 #include "io/clouds/format.h"
 

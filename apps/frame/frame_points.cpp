@@ -1,7 +1,6 @@
-#include "apps/walk/frame_points.h"
+#include "apps/frame/frame_points.h"
 
 #include "apps/picture.h"
-#include "apps/results/cloud_picture.h"
 #include "projection/colour_view.h"
 #include "projection/undistort.h"
 

@@ -1,5 +1,5 @@
 // The result of one frame: a row of frames.csv, a line of the journal.
-#include "apps/results/frame_row.h"
+#include "apps/frame/frame_row.h"
 
 #include <cmath>
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // Clouds that no single camera sees.
-#include "apps/walk/point_clouds.h"
+#include "apps/frame/point_clouds.h"
 
 #include "ao/cloud/surface/cloud_surface.h"
 #include "io/clouds/cloud_edit.h"

@@ -1,4 +1,4 @@
-#include "apps/run/presets.h"
+#include "apps/session/presets.h"
 
 namespace scanshade {
 

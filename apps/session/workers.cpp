@@ -1,5 +1,5 @@
 // The devices of a run, and a method for each frame that is computed at once.
-#include "apps/run/workers.h"
+#include "apps/session/workers.h"
 
 #include <algorithm>
 #include <fmt/format.h>

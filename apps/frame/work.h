@@ -3,8 +3,8 @@
 
 #include "ao/finish/finish.h"
 #include "apps/doubts/doubts.h"
-#include "apps/results/frame_row.h"
-#include "apps/walk/batch_options.h"
+#include "apps/frame/frame_options.h"
+#include "apps/frame/frame_row.h"
 #include "projection/attach.h"
 
 #include <memory>
@@ -37,16 +37,5 @@ struct Work {
 };
 
 using WorkPtr = std::shared_ptr<Work>;
-
-/// What is judged once it is computed. Reads `row.valid_share` and `row.coverage`.
-[[nodiscard]] inline ComputedFrame computed_frame(const Work& work) {
-    return {work.frame,
-            work.row.camera,
-            work.row.valid_share,
-            work.row.coverage,
-            work.depth,
-            work.ao.visibility,
-            work.by_points ? &work.of_points : nullptr};
-}
 
 } // namespace scanshade

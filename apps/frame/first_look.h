@@ -1,22 +1,15 @@
 // A look at a few of a capture's frames before the walk begins: its noise and the size of its scene are measured there.
 #pragma once
 
+#include "apps/frame/frame_options.h"
 #include "io/captures/capture.h"
 #include "projection/project.h"
 
 #include <cstddef>
 #include <limits>
-#include <map>
 #include <vector>
 
 namespace scanshade {
-
-/// Frames that were decoded before the walk began, so that it need not decode them again.
-struct LoadedFrame {
-    Frame frame;
-    double took_ms = 0;
-};
-using LoadedFrames = std::map<std::size_t, LoadedFrame>; ///< by index in the capture
 
 /// Depth images of up to five of the frames, spread evenly; empty ones of frames that cannot be loaded, and of clouds
 /// without a grid, which are no sensor's image: but, with `one_view`, those that is_one_view() tells. `kept`, if given,

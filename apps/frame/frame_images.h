@@ -1,7 +1,7 @@
 // After a frame is computed: values on the recorded pixels or points, confidence, maps and pictures.
 #pragma once
 
-#include "apps/walk/work.h"
+#include "apps/frame/work.h"
 
 namespace scanshade {
 
@@ -43,7 +43,8 @@ struct FrameImages {
 };
 
 /// Attaches visibility and confidence to what was recorded, and makes the images that `outputs` asks for, on the device
-/// that computed the frame.
-[[nodiscard]] FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outputs);
+/// that computed the frame. `every_error`: the expected error of each pixel is needed whatever files are.
+[[nodiscard]] FrameImages finish(Work& work, const FrameOptions& options, const Outputs& outputs,
+                                 bool every_error = false);
 
 } // namespace scanshade

@@ -1,14 +1,16 @@
-// The settings of `scanshade run`, and the options of the walk that follow from them.
+// What was asked for: settings by rows, and the options of the walk that follow from them.
 #pragma once
 
 #include "ao/base/method.h"
 #include "ao/base/quality.h"
+#include "ao/cloud/cloud_ao.h"
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/sequence/sequence_ao.h"
 #include "apps/command.h"
-#include "apps/measure/front/budget.h"
-#include "apps/run/presets.h"
-#include "apps/walk/batch.h"
+#include "apps/frame/frame_options.h"
+#include "apps/method_settings.h"
+#include "apps/session/limits.h"
+#include "apps/session/presets.h"
 
 #include <memory>
 #include <optional>

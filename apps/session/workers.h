@@ -3,8 +3,8 @@
 
 #include "ao/frame.h"
 #include "ao/gpu/device.h"
+#include "apps/frame/method_pool.h"
 #include "apps/method_settings.h"
-#include "apps/walk/method_pool.h"
 
 #include <memory>
 #include <string>

@@ -1,7 +1,7 @@
-#include "apps/walk/first_look.h"
+#include "apps/frame/first_look.h"
 
-#include "apps/walk/large_frames.h"
-#include "apps/walk/point_clouds.h"
+#include "apps/frame/point_clouds.h"
+#include "apps/large/large_cloud_run.h"
 #include "projection/base/error.h"
 #include "projection/base/spread.h"
 #include "projection/base/stopwatch.h"
