@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import scanshade
+from same_as_program import differences
 
 K = np.array([[525.0, 0, 319.5], [0, 525.0, 239.5], [0, 0, 1]])
 
@@ -177,3 +178,47 @@ def test_settings_are_listed():
     names = {row["name"] for row in scanshade.settings() if row["for"] == "session"}
     assert {"method", "radius", "surfel.radius", "cloud.rays", "sequence.fuse", "device"} <= names
     assert "out" not in names
+
+
+# What `run` decides before a capture's first frame: the library decides the same.
+
+
+def test_a_small_scene_gets_a_small_radius(tmp_path):
+    write_pgm(tmp_path / "depth.pgm", corner())
+    units = 20000  # per metre: the scene is 0.1 m away
+    found, frames = differences(
+        tmp_path / "depth.pgm", "--camera", "525,525,319.5,239.5", "--depth-scale", units,
+        opening={"camera": "525,525,319.5,239.5", "depth_scale": units})  # fmt: skip
+    assert (found, frames) == ([], 1)
+    r = scanshade.ambient_occlusion(corner(), K, depth_scale=units)
+    assert r.info["radius"] < 0.5 and "the scene is only" in r.info["warnings"][0]
+    assert scanshade.ambient_occlusion(corner(), K, depth_scale=units, radius=0.5).info["radius"] == 0.5
+
+
+def test_a_noisy_cloud_of_one_camera_is_its_image(tmp_path):
+    run("generate", "office", "-o", tmp_path / "capture", "--frames", 1, "--size", "320x240", "--sensor", "kinect", "--truth=false")
+    frame = scanshade.open(tmp_path / "capture")[0]
+    v, u = np.nonzero(frame.depth)
+    z, k = frame.depth[v, u].astype(float), frame.K
+    points = np.stack([(u - k[0, 2]) / k[0, 0] * z, (v - k[1, 2]) / k[1, 1] * z, z], 1)
+    points = points[np.random.default_rng(1).permutation(len(points))[: len(points) // 2]]
+    np.savetxt(tmp_path / "part.xyz", points, fmt="%.6f")
+    found, frames = differences(tmp_path / "part.xyz")
+    assert (found, frames) == ([], 1)
+    r = scanshade.Session().ambient_occlusion(scanshade.open(tmp_path / "part.xyz")[0])
+    assert any("computed as its image" in warning for warning in r.info["warnings"])
+
+
+def test_depths_that_contradict_the_poses_are_doubtful(tmp_path):
+    run("generate", "office", "-o", tmp_path / "capture", "--frames", 4, "--size", "320x240", "--step", 10, "--truth=false")
+    right = scanshade.open(tmp_path / "capture")
+    wrong = {"depth_scale": 2500}  # twice as far
+    found, frames = differences(tmp_path / "capture", "--depth-scale", 2500, opening=wrong)
+    assert (found, frames) == ([], 4)
+    session = scanshade.Session()
+    doubts = session.ambient_occlusion(scanshade.open(tmp_path / "capture", **wrong)[0]).doubts
+    assert any("poses" in doubt for doubt in doubts)
+    assert not any("poses" in doubt for doubt in session.ambient_occlusion(right[0]).doubts)
+    # and of arrays
+    depths, poses = np.stack([f.depth * 2 for f in right]), np.stack([f.world_from_camera for f in right])
+    assert any("poses" in doubt for doubt in session.ambient_occlusion(depths, right[0].K, poses=poses).doubts)
