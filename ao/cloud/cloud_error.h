@@ -2,7 +2,7 @@
 // (ao/cloud/expected_errors.txt).
 #pragma once
 
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 
 #include <array>
 #include <cstdint>

@@ -3,7 +3,7 @@
 #include "ao/gpu/transfer.h"
 #include "projection/attach.h"
 #include "projection/base/error.h"
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 #include "projection/srgb.h"
 #include "shaders/shared/finish.h"
 

@@ -3,7 +3,7 @@
 
 #include "apps/picture.h"
 #include "projection/colour_view.h"
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 
 #include <algorithm>
 #include <fmt/format.h>

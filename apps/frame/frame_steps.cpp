@@ -4,8 +4,8 @@
 #include "apps/frame/sequence_steps.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
-#include "projection/expected_error.h"
 #include "projection/project.h"
+#include "projection/sensor/expected_error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "ao/base/method.h"
-#include "apps/walk/batch_options.h"
+#include "apps/frame/frame_options.h"
 #include "projection/attach.h"
 #include "projection/frame.h"
 

@@ -6,7 +6,7 @@
 #include "io/content_hash.h"
 #include "io/output_file.h"
 #include "projection/base/error.h"
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/format.h"
 #include "projection/base/error.h"
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 
 #include <algorithm>
 #include <chrono>

@@ -6,7 +6,6 @@
 #include "projection/base/error.h"
 
 #include <algorithm>
-#include <array>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <limits>
@@ -16,34 +15,6 @@
 
 namespace scanshade {
 namespace {
-
-/// Settings that do not go into the key as typed: they change no results, or the key has them as used.
-constexpr std::array aside = {"frames",         "camera",
-                              "depth-scale",    "association-limit",
-                              "registered",     "depth-noise",
-                              "method",         "radius",
-                              "quality",        "max-error",
-                              "max-ms",         "settings",
-                              "device",         "out",
-                              "write",          "format",
-                              "colour-format",  "overwrite",
-                              "dump",           "resume",
-                              "retry",          "shard",
-                              "scratch",        "scratch-limit",
-                              "no-locks",       "log",
-                              "shade-strength", "colour-cloud",
-                              "cloud",          "cloud-resolution",
-                              "poses",          "in-flight",
-                              "preset",         "quiet",
-                              "colour",         "page",
-                              "page-points",    "tar",
-                              "strict",         "shade",
-                              "light"};
-
-/// Settings that change no results when they are typed differently.
-constexpr std::array elsewhere = {"out",    "overwrite", "dump",          "resume",   "retry",
-                                  "shard",  "scratch",   "scratch-limit", "no-locks", "log",
-                                  "device", "in-flight", "preset",        "quiet",    "strict"};
 
 std::string row_text(const Parameter& row) { return row.name + "=" + value_text(row); }
 
@@ -175,7 +146,7 @@ std::string settings_key(const RunReport& report, const Outputs& outputs, const 
         parts.push_back(light);
     for (const Stage& stage : report.settings)
         for (const Parameter& row : stage.rows)
-            if (!std::ranges::count(aside, row.name))
+            if (row.affects == Affects::results) // of others the key has what follows from them
                 parts.push_back(row_text(row));
     return key_of(parts);
 }
@@ -187,7 +158,7 @@ std::string task_key(const std::vector<Stage>& settings, const Capture& capture,
         parts.push_back(around(capture, 0, capture.entries.size()));
     for (const Stage& stage : settings)
         for (const Parameter& row : stage.rows)
-            if (!std::ranges::count(elsewhere, row.name))
+            if (row.affects != Affects::nothing)
                 parts.push_back(row_text(row));
     std::string listed; // hashed from time to time: all stamps of a million frames would take as much as their listing
     constexpr std::size_t most = 1 << 20;

@@ -63,6 +63,10 @@ class OneOf {
 /// What a command writes to the path that a setting holds.
 enum class Writes { nothing, file, folder };
 
+/// What changes with a setting: results that must then be computed anew; results, through a value that follows from it
+/// and from the input (radius, camera); the files that are written of them; nothing but how a run goes.
+enum class Affects { results, as_used, outputs, nothing };
+
 /// A setting bound to the variable that holds it.
 struct Parameter {
     using Target = std::variant<bool*, int*, float*, double*, std::optional<double>*, std::string*, OneOf>;
@@ -76,6 +80,7 @@ struct Parameter {
     std::vector<std::string> choices{};                    ///< for strings: the only values allowed; empty = any
     bool common = false;                                   ///< shown on the first page of a command's help
     Writes writes = Writes::nothing;                       ///< for strings: whether the value names an output
+    Affects affects = Affects::results;
 };
 
 /// Sets the row's variable from text. Throws Misuse naming the row, the text, and what was expected.

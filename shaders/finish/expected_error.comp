@@ -1,4 +1,4 @@
-// The error to expect of each visibility (projection/expected_error.h).
+// The error to expect of each visibility (projection/sensor/expected_error.h).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -4,7 +4,7 @@
 #include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scanner.h"
 #include "projection/base/error.h"
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 #include "tests/support/files.h"
 #include "tests/support/points.h"
 

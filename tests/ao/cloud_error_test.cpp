@@ -9,7 +9,7 @@
 #include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scanner.h"
 #include "projection/base/error.h"
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 #include "tests/support/points.h"
 #include "tests/support/says.h"
 

@@ -4,7 +4,7 @@
 #include "apps/picture.h"
 #include "projection/attach.h"
 #include "projection/base/error.h"
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 #include "projection/srgb.h"
 #include "tests/support/scenes.h"
 

@@ -5,7 +5,7 @@
 #include "ao/cloud/sides/patches.h"
 #include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scanner.h"
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 #include "tests/support/files.h"
 #include "tests/support/points.h"
 

@@ -10,7 +10,7 @@
 #include "apps/walk/large_frames.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 #include "tests/support/files.h"
 #include "tests/support/points.h"
 

@@ -3,12 +3,14 @@
 #include "apps/command.h"
 #include "apps/json.h"
 #include "apps/results/journal.h"
+#include "apps/session/settings.h"
 #include "tests/support/files.h"
 #include "tests/support/resumed.h"
 
 #include <filesystem>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <map>
 #include <nlohmann/json.hpp>
 
 namespace scanshade {
@@ -164,6 +166,22 @@ TEST_F(ResumeTest, a_capture_that_another_run_holds_does_not_keep_the_others_fro
     EXPECT_TRUE(fs::exists(out() / "two/manifest.json"));
     EXPECT_EQ(run_program(arguments + " --resume").exit_code, 0);
     EXPECT_TRUE(fs::exists(out() / "one/manifest.json"));
+}
+
+/// A flag of the wrong class is results that stay though they are other ones, or that are computed again for nothing.
+TEST(Affects, every_flag_has_its_class) {
+    std::map<Affects, std::string> flags;
+    for (const Stage& stage : RunSettings().stages())
+        for (const Parameter& row : stage.rows)
+            if (row.affects != Affects::results) // all others, and every flag of a method, of clouds and of sequences
+                flags[row.affects] += row.name + " ";
+    EXPECT_EQ(flags[Affects::as_used],
+              "frames camera colour poses depth-scale registered association-limit depth-noise "
+              "method radius quality max-error max-ms settings ");
+    EXPECT_EQ(flags[Affects::outputs], "write format colour-format shade light shade-strength cloud cloud-resolution "
+                                       "colour-cloud page page-points tar ");
+    EXPECT_EQ(flags[Affects::nothing], "preset device in-flight out overwrite resume retry strict quiet log shard "
+                                       "no-locks scratch scratch-limit dump ");
 }
 
 } // namespace

@@ -9,7 +9,7 @@
 #include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
 #include "projection/base/stopwatch.h"
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 #include "tests/gauntlet/perturb.h"
 #include "tests/support/data.h"
 

@@ -1,5 +1,5 @@
 // Expected errors: which signs a pixel shows, and what follows from them.
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 
 #include "tests/support/scenes.h"
 

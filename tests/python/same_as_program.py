@@ -21,7 +21,7 @@ import scanshade
 
 def program_result(path, out, *words):
     """manifest.json of a run with maps as floats; None, and why, where the program refuses the capture."""
-    command = [os.environ["SCANSHADE_PROGRAM"], "run", path, "-o", out, "--page", "no", "--format", "tiff", "--write", "ao,confidence"]
+    command = [os.environ["SCANSHADE_PROGRAM"], "run", path, "-o", out, "--page", "no", "--format", "tiff"]
     done = subprocess.run([*map(str, command), *map(str, words)], capture_output=True, text=True)
     manifest = pathlib.Path(out, "manifest.json")
     return (json.loads(manifest.read_text()), "") if manifest.exists() else (None, done.stderr)

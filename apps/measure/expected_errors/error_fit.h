@@ -1,7 +1,7 @@
 // Fits tables of expected errors to pixels whose true error is known.
 #pragma once
 
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 
 #include <array>
 #include <span>

@@ -1,7 +1,7 @@
 // Fits factors of squared errors, which are interpolated between knots, to examples whose true error is known.
 #pragma once
 
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 
 #include <span>
 #include <utility>

@@ -15,7 +15,7 @@
 #include "projection/base/memory.h"
 #include "projection/base/statistics.h"
 #include "projection/base/stopwatch.h"
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 
 #include <ctime>
 #include <fmt/format.h>

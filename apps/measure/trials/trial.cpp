@@ -8,8 +8,8 @@
 #include "projection/base/error.h"
 #include "projection/base/spread.h"
 #include "projection/base/stopwatch.h"
-#include "projection/expected_error.h"
 #include "projection/project.h"
+#include "projection/sensor/expected_error.h"
 
 #include <algorithm>
 #include <cmath>

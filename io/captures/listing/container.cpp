@@ -1,6 +1,6 @@
 #include "io/captures/listing/container.h"
 
-#include "io/captures/capture.h"
+#include "io/captures/listing/capture_listing.h"
 #include "io/content_hash.h"
 #include "io/images/format.h"
 #include "projection/base/error.h"

@@ -1,7 +1,7 @@
 // The layouts of captures on disk, one function each; the table of recordings (recording_formats.h) has their order.
 #pragma once
 
-#include "io/captures/capture.h"
+#include "io/captures/listing/capture_listing.h"
 
 #include <cstddef>
 #include <functional>

@@ -1,4 +1,4 @@
-#include "projection/expected_error.h"
+#include "projection/sensor/expected_error.h"
 
 #include "projection/base/error.h"
 
