@@ -1,6 +1,6 @@
 // What a capture needs before its first frame: noise, method, budget, light, and the head of its report.
-#include "apps/measure/front/front.h"
-#include "apps/measure/trials/trial.h"
+#include "apps/budget/front.h"
+#include "apps/budget/trial.h"
 #include "apps/run/capture_runs.h"
 #include "apps/run/messages.h"
 #include "apps/walk/capture_light.h"

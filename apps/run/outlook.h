@@ -1,7 +1,7 @@
 // The last messages of a run: the expected error of its results, and the cost of a better preset.
 #pragma once
 
-#include "apps/measure/front/front.h"
+#include "apps/budget/front.h"
 #include "apps/results/frame_row.h"
 #include "apps/run/settings.h"
 

@@ -286,7 +286,7 @@ std::vector<Stage> RunSettings::common_stages() {
            .high = 1e6,
            .common = true},
           {.name = std::string(settings_flag),
-           .help = "a file of settings: from calibrate-look, or an earlier run's manifest.json. Flags given here win",
+           .help = "a file of settings, such as an earlier run's manifest.json. Flags given here win",
            .value = &s.settings,
            .common = true},
           {.name = "device",

@@ -5,8 +5,8 @@
 #include "ao/base/quality.h"
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/sequence/sequence_ao.h"
+#include "apps/budget/budget.h"
 #include "apps/command.h"
-#include "apps/measure/front/budget.h"
 #include "apps/run/presets.h"
 #include "apps/walk/batch.h"
 
