@@ -1,7 +1,6 @@
 // One capture to compute, and the folder of its results: what is refused there, and what is cleared before a run.
 #pragma once
 
-#include "ao/light/light.h"
 #include "apps/walk/batch_options.h"
 #include "io/captures/capture.h"
 
@@ -20,9 +19,8 @@ struct OpenedCapture {
     Capture capture;
     std::vector<std::size_t> of; ///< all its frames to compute
     /// Made by the first block that needs them.
-    std::once_flag check_poses, make_key, find_light;
+    std::once_flag check_poses, make_key;
     std::string task_key = {};
-    LightEstimate light = {};
     std::vector<std::string> doubts = {}; ///< of the capture as a whole
 };
 
