@@ -1,4 +1,4 @@
-// The differences between two visibility maps of one view, for `compare`, `bench` and `calibrate-look`.
+// The differences between two visibility maps of one view, for `compare` and `bench`.
 #pragma once
 
 #include <array>

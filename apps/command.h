@@ -67,7 +67,6 @@ std::unique_ptr<Command> view_command();
 std::unique_ptr<Command> refine_command();
 std::unique_ptr<Command> compare_command();
 std::unique_ptr<Command> bench_command();
-std::unique_ptr<Command> calibrate_command();
 std::unique_ptr<Command> generate_command();
 std::unique_ptr<Command> methods_command();
 std::unique_ptr<Command> devices_command();

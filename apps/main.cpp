@@ -39,8 +39,6 @@ const std::array commands = {
                compare_command},
     CommandRow{"bench", "measures methods and settings against truth: time, error and the Pareto front, as a page",
                bench_command},
-    CommandRow{"calibrate-look", "fits a method's free settings to truth, and judges them on other captures",
-               calibrate_command},
     CommandRow{"generate", "generates a capture of a synthetic scene with exact truth", generate_command},
     CommandRow{"methods", "lists the ambient-occlusion methods", methods_command},
     CommandRow{"devices", "lists the Vulkan devices", devices_command},

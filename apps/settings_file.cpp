@@ -33,8 +33,7 @@ json parsed(std::istream& stream) {
 std::vector<CLI::ConfigItem> SettingsFile::from_config(std::istream& stream) const {
     const json text = parsed(stream);
     if (!text.is_object() || !text.contains("settings") || !text["settings"].is_object())
-        throw Misuse(
-            "settings: JSON with an object \"settings\" expected, as calibrate-look and run's manifest.json have");
+        throw Misuse("settings: JSON with an object \"settings\" expected, as run's manifest.json has");
     std::vector<CLI::ConfigItem> given;
     for (const auto& [stage, rows] : text["settings"].items())
         if (stage.starts_with("method") && rows.is_object())

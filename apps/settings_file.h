@@ -1,5 +1,4 @@
-// Settings in a file: calibrate-look writes it and `run --settings` reads it. An earlier run's manifest.json works,
-// too.
+// Settings in a file, which `run --settings` reads: an earlier run's manifest.json, or the developers' fit of them.
 #pragma once
 
 #include "apps/json.h"
@@ -17,7 +16,7 @@ class SettingsFile final : public CLI::Config {
   public:
     /// Throws Misuse if it is not such JSON.
     [[nodiscard]] std::vector<CLI::ConfigItem> from_config(std::istream& stream) const override;
-    /// Never called: write_manifest() and calibrate-look write the program's settings.
+    /// Never called: write_manifest() writes the program's settings.
     [[nodiscard]] std::string to_config(const CLI::App*, bool, bool, std::string) const override { return {}; }
 };
 

@@ -79,7 +79,8 @@ CacaoConstants constants_from(const CacaoOptions& options, const Pinhole& camera
     k.near_limit_rec = 1.0F / ((options.radius * 1.2F * wide) / tan_half_height);
     k.mip_weight =
         options.scan() ? -1.0F / (k.radius * k.radius) : k.neg_rec_radius * k.radius; // AMD's slip: always -1
-    // The factors were fitted to ray-traced truth (calibrate-look): AMD's curve leaves corners far too dark.
+    // The factors were fitted to ray-traced truth (developers_bench calibrate): AMD's curve leaves corners far too
+    // dark.
     const CacaoToneCurve own = options.scan() ? CacaoToneCurve::calibrated : CacaoToneCurve::documented;
     const bool calibrated = options.tone_curve.value_or(own) == CacaoToneCurve::calibrated;
     k.shadow_strength = std::clamp(4.3F * options.shadow_multiplier * (calibrated ? 0.294F : 1.0F), 0.0F, 10.0F);

@@ -336,7 +336,6 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
     k.noise_floor = static_cast<float>(input.noise.floor_m);
     k.noise_per_z2 = static_cast<float>(input.noise.per_z2);
     k.strength = static_cast<float>(input.strength);
-    k.unshade_power = input.shade == Shade::ambient && input.light ? input.light->power : 1;
     k.light = input.light.value_or(shared::LightConstants{});
     k.errors = input.errors;
     k.words = static_cast<int>(words_of(size));

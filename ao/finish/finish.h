@@ -3,8 +3,8 @@
 #pragma once
 
 #include "ao/base/method.h"
+#include "ao/finish/light.h"
 #include "ao/gpu/program.h"
-#include "ao/light/light.h"
 #include "projection/camera.h"
 #include "projection/sensor/noise.h"
 #include "shaders/shared/expected_error.h"
@@ -29,8 +29,7 @@ struct FinishOutputs {
     int confidence_bits = 0; ///< as a map of 8 bits: confidence_from() that error; 0 = no map
     int map_bits = 0;        ///< of visibility, 16 or 8; 0 = no map
     bool picture = false;    ///< colour, or clay where there is none, times visibility in linear light
-    bool unshaded = false;   ///< colour divided by what the picture is multiplied by, where there is colour; with
-                             ///< Shade::ambient by visibility to the power that the photographs show
+    bool unshaded = false;   ///< colour divided by what the picture is multiplied by, where there is colour
     bool split = false;      ///< the ambient and the direct part of colour, where there is colour
     bool indirect = false;   ///< one bounce: what colour comes from neighbours within the radius, where there is colour
     LightValues light_values = LightValues::bytes; ///< of the last three

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "ao/base/method.h"
-#include "ao/light/light.h"
+#include "ao/finish/light.h"
 #include "apps/frame/outputs.h"
 #include "io/captures/capture.h"
 #include "projection/project.h"

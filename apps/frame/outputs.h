@@ -79,7 +79,7 @@ struct Outputs {
 /// What the numbers in unshaded, ambient, direct and indirect mean; empty where none of them is written.
 [[nodiscard]] std::string colour_encoding(const Outputs& outputs);
 
-/// Whether the light of the colour images has to be known.
+/// Whether the light of the colour images matters.
 [[nodiscard]] inline bool needs_light(const Outputs& outputs) {
     return outputs.light || (outputs.shade == Shade::ambient && (outputs.shaded || outputs.unshaded || outputs.panel));
 }

@@ -32,7 +32,7 @@ struct RunReport {
     std::vector<std::string> budget;  ///< what an error or time budget chose, expected and found; empty without one
     std::string shading;              ///< what the shaded pictures show, and why
     std::string colour_encoding = {}; ///< of unshaded, ambient, direct and indirect; empty = none is written
-    std::string light = {};           ///< what was found of the colours' light; empty = nothing needs it
+    std::string light = {};           ///< of the colours; empty = nothing needs it
     std::vector<std::string> outlook = {}; ///< the error to expect, and the cost of less
     std::vector<FrameRow> frames;          ///< shortened
     std::size_t done_now = 0;              ///< frames that this process computed; others were done before

@@ -107,8 +107,6 @@ void prepare_folder(const CaptureJob& job, const ReportFiles& reports, bool firs
         stems.insert(report.stem().string());
         fs::remove(report);
     }
-    if (!needs_light(job.batch.outputs) && job.block.empty())
-        fs::remove(job.folder() / "light.json"); // of an earlier run
     stems.insert("index");
     stems.insert(page::recording_stem);
     page::remove_page(job.folder());

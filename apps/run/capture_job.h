@@ -1,7 +1,6 @@
 // One capture to compute, and the folder of its results: what is refused there, and what is cleared before a run.
 #pragma once
 
-#include "ao/light/light.h"
 #include "apps/session/capture_look.h"
 #include "apps/walk/batch_options.h"
 #include "io/captures/capture.h"
@@ -21,9 +20,8 @@ struct OpenedCapture {
     Capture capture;
     std::vector<std::size_t> of; ///< all its frames to compute
     /// Made by the first block that needs them.
-    std::once_flag check, make_key, find_light;
+    std::once_flag check, make_key;
     std::string task_key = {};
-    LightEstimate light = {};
     CaptureFindings findings = {};
 };
 

@@ -1,10 +1,9 @@
 // What a capture needs before its first frame: noise, method, budget, light, and the head of its report.
-#include "apps/measure/front/budget.h"
-#include "apps/measure/front/front.h"
-#include "apps/measure/trials/trial.h"
+#include "apps/budget/budget.h"
+#include "apps/budget/front.h"
+#include "apps/budget/trial.h"
 #include "apps/run/capture_runs.h"
 #include "apps/run/messages.h"
-#include "apps/walk/capture_light.h"
 #include "apps/walk/large_frames.h"
 #include "io/output_file.h"
 #include "projection/base/error.h"
@@ -73,7 +72,7 @@ CaptureRuns::Prepared CaptureRuns::prepare(CaptureJob& job) {
             job.capture.warnings.push_back(std::move(warning));
     RunReport report = begun_report(job, workers, *setup);
     report.budget = budget;
-    const std::string light = take_light(job, report, by_points ? nullptr : methods.get());
+    const std::string light = take_light(job, report, by_points);
     std::string settings = settings_key(report, job.batch.outputs, job.batch.noise, light);
     std::string at_work;
     if (by_points) {
@@ -121,30 +120,21 @@ std::vector<std::string> CaptureRuns::keep_to_budget(const CaptureJob& job, gpu:
     return choice.sentences;
 }
 
-std::string CaptureRuns::take_light(CaptureJob& job, RunReport& report, MethodPool* methods) {
+std::string CaptureRuns::take_light(CaptureJob& job, RunReport& report, bool by_points) const {
     if (!needs_light(job.batch.outputs))
         return "";
-    if (!methods) {
+    if (by_points) {
         job.capture.warnings.emplace_back(
             "--shade ambient and --write light need images: clouds computed from their points are multiplied.");
         return "";
     }
-    const fs::path file = job.folder() / "light.json";
-    const std::string task = task_of(job);
-    LightEstimate& light = job.opened->light;
-    std::call_once(job.opened->find_light, [&] {
-        if (!asked_.resume || !light_in(file, task)) {
-            const MethodPool::Lease method = methods->lease();
-            light = light_of(job.capture, job.of, *method, job.batch, light_request(asked_.light));
-            write_atomically(file, text_of(light, task));
-        }
-        light = light_in(file, task).value(); // as a later run reads it
-    });
-    job.batch.light = light.light;
-    report.light = light.sentence;
-    if (!light.light.doubt.empty())
-        warn(fmt::format("{}: warning: {}", job.capture.path.string(), light.light.doubt));
-    return text_of(light, "");
+    Light light = light_from_text(asked_.light);
+    light.in_world = std::ranges::any_of(job.capture.entries,
+                                         [](const CaptureEntry& entry) { return entry.world_from_camera.has_value(); });
+    job.batch.light = light;
+    report.light = light.sentence();
+    const Eigen::Vector3d& d = light.direct;
+    return light.has_direct() ? fmt::format("light {},{},{} {}", d.x(), d.y(), d.z(), light.in_world) : "";
 }
 
 bool CaptureRuns::all_by_points(const CaptureJob& job) const {

@@ -93,10 +93,9 @@ class CaptureRuns {
     RunReport begun_report(const CaptureJob& job, Workers* workers, MethodSetup& setup);
     /// Picks method and settings for the capture, starting from the command line. Returns sentences about the choice.
     std::vector<std::string> keep_to_budget(const CaptureJob& job, gpu::Device& device);
-    /// The light of the colours, where outputs need it: what an earlier run of the same task has found, else estimated
-    /// anew and written beside the results. Returns its text, which belongs to what results were made from.
-    /// `methods`: null where clouds are computed from their points.
-    std::string take_light(CaptureJob& job, RunReport& report, MethodPool* methods);
+    /// The light of the colours, where outputs need it. Returns the text of a direct light, which belongs to what
+    /// results were made from.
+    std::string take_light(CaptureJob& job, RunReport& report, bool by_points) const;
     /// Whether nothing but clouds' points remains to be computed. Clouds that are neither in memory nor large may turn
     /// out to be images.
     [[nodiscard]] bool all_by_points(const CaptureJob& job) const;

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/frame/frame_row.h"
-#include "apps/measure/front/front.h"
+#include "apps/budget/front.h"
 #include "apps/session/settings.h"
 
 #include <string>

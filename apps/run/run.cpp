@@ -7,7 +7,6 @@
 #include "apps/run/interruption.h"
 #include "apps/run/openings.h"
 #include "apps/run/tally.h"
-#include "apps/walk/capture_light.h"
 #include "apps/walk/progress.h"
 #include "io/files.h"
 #include "projection/base/error.h"
@@ -73,11 +72,6 @@ class Run final : public Command {
                 throw;
             } catch (const Misuse&) {
                 throw;
-            } catch (const NoLight& failure) {
-                warn(fmt::format("failed: {}", failure.what()));
-                const std::lock_guard alone(counting);
-                failures_.push_back(failure.what());
-                ++unopened;
             } catch (const Outage& failure) {
                 warn(fmt::format("failed: {}", failure.what()));
                 fault = Fault::outage;

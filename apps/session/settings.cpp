@@ -4,7 +4,6 @@
 #include "ao/cloud/cloud_ao.h"
 #include "apps/method_settings.h"
 #include "apps/settings_file.h"
-#include "apps/walk/capture_light.h"
 #include "projection/base/error.h"
 #include "projection/base/nearest_word.h"
 
@@ -300,7 +299,7 @@ std::vector<Stage> RunSettings::common_stages() {
            .common = true,
            .affects = Affects::as_used},
           {.name = std::string(settings_flag),
-           .help = "a file of settings: from calibrate-look, or an earlier run's manifest.json. Flags given here win",
+           .help = "a file of settings, such as an earlier run's manifest.json. Flags given here win",
            .value = &s.settings,
            .common = true,
            .affects = Affects::as_used},
@@ -355,9 +354,9 @@ std::vector<Stage> RunSettings::common_stages() {
            .affects = Affects::outputs},
           {.name = "light",
            .help =
-               "direct light in the colours, for --shade ambient and --write light: auto = estimated over the whole "
-               "capture; none = all light is ambient; X,Y,Z = towards it, in the recording's world where frames have "
-               "poses, else in camera space (x right, y down, z forward)",
+               "direct light in the colours, for --shade ambient and --write light: auto, none = all light is ambient; "
+               "X,Y,Z = towards it, as long as it is stronger than ambient light, in the recording's world where frames "
+               "have poses, else in camera space (x right, y down, z forward)",
            .value = &s.light,
            .affects = Affects::outputs},
           {.name = "shade-strength",
@@ -485,7 +484,7 @@ void RunSettings::resolve() {
     range_ = range_from(depth_range);
     if (depth_noise != "auto")
         (void)noise_from_text(depth_noise);
-    (void)light_request(light);
+    (void)light_from_text(light);
     if (!recording_cloud.empty() && (resume || paths.size() > 1))
         throw Misuse("cloud: is made of all frames of one capture in one run, without --resume");
     if (budget.any() && (quality || preset != Preset::fast))

@@ -1,4 +1,4 @@
-// Direct light over ambient light at each pixel (ao/light/README.md); 0 where there is no surface, and in shadow. The
+// Direct light over ambient light at each pixel (ao/finish/light.h); 0 where there is no surface, and in shadow. The
 // depth image casts the shadows: a ray towards the light stops at what lies before it, by no more than a thickness.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -37,11 +37,10 @@ void main() {
     vec3 normal = normal_of(p, at);
     float visible = imageLoad(visibility, at).x, ratio = 0.0;
     if (dot(normal, k.light.direct) > 0.0) {
-        float power = isnan(visible) ? 1.0 : pow(clamp(visible, 0.01, 1.0), k.light.power);
         float z = 1.0 / inverse_at(at);
         vec3 from = unproject(k.camera, vec2(p), z) + normal * shadow_bias(z);
-        float sees = k.light.shadows == 0 ? 1.0 : lit(from, normalize(k.light.direct));
-        ratio = direct_over_ambient(k.light, normal, power, sees);
+        float sees = lit(from, normalize(k.light.direct));
+        ratio = direct_over_ambient(k.light, normal, isnan(visible) ? 1.0 : visible, sees);
     }
     direct[at] = ratio;
 }

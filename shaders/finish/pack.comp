@@ -52,7 +52,7 @@ uvec3 stored_from(vec3 steps) { return uvec3(stored_from(steps.x), stored_from(s
 uvec3 shaded_pixel(int at, uvec3 own_colour, uint known, float visible) {
     float light = strong(visible);
     if (picture == picture_colour || (picture == picture_both && known != 0u))
-        return stored_from(steps_of(own_colour) * (ambient_alone == 0 ? vec3(light) : 1.0 - shaded_part(at) * (1.0 - light)));
+        return stored_from(steps_of(own_colour) * (ambient_alone == 0 ? light : 1.0 - ambient_part(at) * (1.0 - light)));
     bool surface = imageLoad(surface, at).x > 0.0;
     uint grey = uint(roundEven(clay_edge_on + clay_facing * imageLoad(cosine, at).x));
     return stored_from(steps_of(surface ? uvec3(grey) : no_surface) * light);
@@ -131,8 +131,9 @@ void main() {
     }
     if (split != 0) {
         mat4x3 light = mat4x3(steps_of(first), steps_of(second), steps_of(third), steps_of(fourth));
-        mat4x3 share = mat4x3(ambient_part(at.x), ambient_part(at.y), ambient_part(at.z), ambient_part(at.w));
-        mat4x3 ambient = matrixCompMult(light, share), rest = light - ambient;
+        mat4x3 ambient = mat4x3(light[0] * ambient_part(at.x), light[1] * ambient_part(at.y),
+                                light[2] * ambient_part(at.z), light[3] * ambient_part(at.w));
+        mat4x3 rest = light - ambient;
         words = packed(stored_from(ambient[0]), stored_from(ambient[1]), stored_from(ambient[2]), stored_from(ambient[3]));
         ambient_out[3 * word] = words.x;
         ambient_out[3 * word + 1] = words.y;

@@ -14,7 +14,6 @@ struct FinishConstants {
     float noise_floor, noise_per_z2; // sigma(z) = floor + per_z2 z^2, metres
     float strength;                  // of the visibility in pictures
     int words;                       // of four pixels each
-    float unshade_power;             // of visibility that colours are divided by
     LightConstants light;            // that pictures are split by
     vec2 seeds[ball_seeds];          // evenly over the unit disc
     ErrorTable errors;               // of the method

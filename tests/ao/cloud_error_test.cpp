@@ -4,12 +4,12 @@
 
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/cloud_work.h"
-#include "apps/measure/expected_errors/cloud_error_fit.h"
-#include "apps/measure/expected_errors/error_fit.h"
 #include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scanner.h"
 #include "projection/base/error.h"
 #include "projection/sensor/expected_error.h"
+#include "tests/bench/cloud_error_fit.h"
+#include "tests/bench/error_fit.h"
 #include "tests/support/points.h"
 #include "tests/support/says.h"
 
@@ -89,7 +89,7 @@ TEST(CloudErrors, tables_are_read_as_they_were_written) {
     EXPECT_EQ(read.checked, shipped_cloud_errors().checked);
     EXPECT_EQ(read.unchecked, shipped_cloud_errors().unchecked);
     EXPECT_EQ(read.turned, shipped_cloud_errors().turned);
-    EXPECT_TRUE(says(read.made_by, "bench --cloud-errors")) << "the command that makes it again";
+    EXPECT_TRUE(says(read.made_by, "developers_bench cloud-errors")) << "the command that makes it again";
 }
 
 TEST(CloudErrors, damaged_tables_name_the_line) {

@@ -163,8 +163,7 @@ shared::ErrorTable errors_of(float error) {
 constexpr FinishOutputs all_of_light{.picture = true, .unshaded = true, .split = true};
 
 /// Light from the camera's left and behind it, twice as strong as ambient light.
-constexpr shared::LightConstants light{
-    .direct = {-1.2F, -0.4F, -1.5F}, .tint = {1.1F, 1, 0.8F}, .gradient = {}, .power = 1, .shadows = 0};
+constexpr shared::LightConstants light{.direct = {-1.2F, -0.4F, -1.5F}};
 
 double linear(uchar stored) { return linear_from_srgb(stored / 255.0); }
 
@@ -202,11 +201,10 @@ TEST_F(FinishTest, visibility_multiplies_the_ambient_part_alone) {
         light,
         {-static_cast<float>(std::sin(std::numbers::pi / 6)), 0, -static_cast<float>(std::cos(std::numbers::pi / 6))},
         0.5F, 1);
-    const float tint[] = {light.tint.z, light.tint.y, light.tint.x};
     for (int c = 0; c < 3; ++c) {
         const double whole = linear(input.colour(60, 80)[c]), found = linear(made.picture(60, 80)[c]);
         const auto expected = [&](float of) {
-            return whole * (1 - 0.5 * static_cast<double>(shared::ambient_share(of, tint[c])));
+            return whole * (1 - 0.5 * static_cast<double>(shared::ambient_share(of)));
         };
         EXPECT_TRUE(std::abs(found - expected(ratio)) < 0.01 || std::abs(found - expected(other)) < 0.01)
             << found << " " << expected(ratio) << " " << expected(other);
@@ -220,7 +218,7 @@ TEST_F(FinishTest, without_direct_light_ambient_shading_is_plain_multiplication)
     const cv::Mat3b plain = Finish(device, Packing::on_device).compute(input, {.picture = true}).picture;
     input.shade = Shade::ambient;
     EXPECT_EQ(share_beyond(Finish(device, Packing::on_device).compute(input, {.picture = true}).picture, plain, 0), 0);
-    input.light = shared::LightConstants{.direct = {}, .tint = {1, 1, 1}, .gradient = {}, .power = 1, .shadows = 1};
+    input.light = shared::LightConstants{.direct = {}};
     EXPECT_EQ(share_beyond(Finish(device, Packing::on_device).compute(input, {.picture = true}).picture, plain, 0), 0);
 }
 

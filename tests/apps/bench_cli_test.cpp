@@ -1,9 +1,9 @@
-// The command bench: its page and tables, references with and without truth, and parts measured by themselves.
+// The command bench: its page and tables, and references with and without truth.
 #include "ao/base/method.h"
 #include "ao/compare.h"
 #include "ao/gpu/device.h"
-#include "apps/measure/front/front.h"
-#include "apps/measure/fused_reference.h"
+#include "apps/budget/front.h"
+#include "apps/budget/fused_reference.h"
 #include "tests/support/measured.h"
 #include "tests/support/says.h"
 
@@ -174,44 +174,6 @@ TEST_F(MeasureTest, without_truth_all_posed_frames_together_are_the_reference) {
     const Ran lost = run_program(fmt::format(fmt::runtime(words), recorded.string(), out() + "2"));
     EXPECT_EQ(lost.exit_code, 3);
     EXPECT_TRUE(says(lost.err, "0 frames with poses"));
-}
-
-TEST_F(MeasureTest, bench_parts_print_what_they_measure) {
-    const auto printed = [&](const std::string& flags) {
-        const Ran ran = run_program("bench " + flags);
-        EXPECT_EQ(ran.exit_code, 0) << flags << "\n" << ran.err;
-        return ran.out;
-    };
-    EXPECT_TRUE(says(printed("--hard-cases --hard-cases.only units --hard-cases.methods gtao"), "every gate kept"));
-    EXPECT_TRUE(says(printed("--cacao --cacao.sizes 64x48,48x64 --cacao.repeat 1 --cacao.passes"), "48x64"));
-    EXPECT_TRUE(says(printed("--clouds --clouds.points 3000 --clouds.rays 2,4"), "4 rays a point"));
-    const fs::path tables = folder / "errors.txt";
-    EXPECT_TRUE(says(printed(fmt::format("--expected-errors {} --expected-errors.together --expected-errors.methods "
-                                         "surfel --expected-errors.frames 1 --expected-errors.fit {}",
-                                         capture(), tables.string())),
-                     "| surfel | "));
-    const std::string fitted = read_bytes(tables);
-    EXPECT_TRUE(says(fitted, "\ntogether surfel ")) << fitted;
-    EXPECT_TRUE(says(fitted, "\nspread gtao ")) << "the others' lines stay";
-    const fs::path maps = folder / "maps";
-    (void)printed(fmt::format("--write-maps {}", maps.string()));
-    EXPECT_TRUE(says(printed(fmt::format("--compare-maps {}", maps.string())), "highest_downsampled"));
-}
-
-TEST_F(MeasureTest, maps_of_two_devices_that_differ_too_much_give_exit_code_2) {
-    const fs::path maps = folder / "maps";
-    ASSERT_EQ(run_program(fmt::format("bench --write-maps {}", maps.string())).exit_code, 0);
-    fs::copy_file(maps / "lowest_native.f32", maps / "high_downsampled.f32", fs::copy_options::overwrite_existing);
-    const Ran ran = run_program(fmt::format("bench --compare-maps {}", maps.string()));
-    EXPECT_EQ(ran.exit_code, 2);
-    EXPECT_TRUE(says(ran.out, "MISSED"));
-}
-
-TEST_F(MeasureTest, bench_measures_one_part_at_a_time) {
-    EXPECT_EQ(run_program("bench --normals --hard-cases").exit_code, 1);
-    EXPECT_EQ(run_program(fmt::format("bench {} --normals", capture())).exit_code, 1);
-    EXPECT_EQ(run_program("bench --clouds --clouds.rays 8,some").exit_code, 1);
-    EXPECT_EQ(run_program("bench --cacao --cacao.sizes 640").exit_code, 1);
 }
 
 /// RMSE of a method's configuration on a capture, from bench.csv.

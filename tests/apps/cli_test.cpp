@@ -623,6 +623,18 @@ std::size_t lines_in(const std::string& text) {
     return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
 }
 
+TEST_F(CliTest, a_file_that_holds_no_settings_is_refused) {
+    const auto settings = [&](const char* file) { return run("--settings " + (folder / file).string()); };
+    std::ofstream(folder / "odd.json") << "{\"settings\": {\"method cacao\": {\"cacao.colour\": 3}}}";
+    std::ofstream(folder / "no.json") << "settings";
+    for (const char* file : {"odd.json", "no.json", "nowhere.json"})
+        EXPECT_EQ(settings(file).exit_code, 1) << file;
+    std::ofstream(folder / "mistyped.json") << R"({"settings": {"method cacao": {"cacao.raduis": 0.3}}})";
+    const Ran mistyped = settings("mistyped.json");
+    EXPECT_NE(mistyped.err.find("--cacao.raduis: no such flag; did you mean --cacao.radius?"), std::string::npos)
+        << mistyped.err;
+}
+
 TEST(CliHelpTest, help_for_programs_has_every_command_with_its_flags) {
     const json all = json::parse(run_program("help --json").out);
     const auto named = [](const json& list, const std::string& name) {
@@ -650,8 +662,8 @@ TEST(CliHelpTest, help_all_shows_every_flag_with_default_and_range) {
 }
 
 TEST(CliHelpTest, the_first_page_of_every_command_fits_a_screen) {
-    for (const char* command : {"inspect", "run", "plan", "status", "merge", "compare", "bench", "calibrate-look",
-                                "generate", "methods", "devices"}) {
+    for (const char* command :
+         {"inspect", "run", "plan", "status", "merge", "compare", "bench", "generate", "methods", "devices"}) {
         const Ran ran = run_program(fmt::format("help {}", command));
         EXPECT_EQ(ran.exit_code, 0) << command;
         EXPECT_LE(lines_in(ran.out), 60u) << ran.out;

@@ -1,7 +1,7 @@
 // Classes of pixels by which bench tells errors apart (place, distance from edges, angle), and the bias that a curve
 // leaves.
 #include "ao/compare.h"
-#include "apps/measure/trials/error_classes.h"
+#include "apps/compare/error_classes.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

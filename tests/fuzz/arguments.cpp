@@ -1,9 +1,9 @@
 // Fuzz target: values of flags that are little languages of their own. The first byte chooses: a slice of frames, a
 // camera, a shard, a list, a noise model, a unit of depth, a measured front.
+#include "apps/budget/front.h"
 #include "apps/jobs/job.h"
 #include "apps/json.h"
 #include "apps/lists.h"
-#include "apps/measure/front/front.h"
 #include "apps/slice.h"
 #include "io/cameras/camera_file.h"
 #include "io/images/image_file.h"

@@ -57,10 +57,12 @@ std::string read_bytes(const fs::path& file) {
 
 bool program_is_built() { return std::filesystem::exists(SCANSHADE_PROGRAM); }
 
-Ran run_program(const std::string& arguments) {
+Ran run_program(const std::string& arguments) { return run_program_at(SCANSHADE_PROGRAM, arguments); }
+
+Ran run_program_at(const std::string& program, const std::string& arguments) {
     const TemporaryFolder folder;
-    const std::string command = fmt::format("'{}' {} >'{}' 2>'{}'", SCANSHADE_PROGRAM, arguments,
-                                            (folder / "out").string(), (folder / "err").string());
+    const std::string command =
+        fmt::format("'{}' {} >'{}' 2>'{}'", program, arguments, (folder / "out").string(), (folder / "err").string());
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_bytes(folder / "out"),
             read_bytes(folder / "err")};

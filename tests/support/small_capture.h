@@ -46,6 +46,8 @@ struct Ran {
 [[nodiscard]] bool program_is_built();
 /// Runs the program with `arguments`, as a shell takes them.
 [[nodiscard]] Ran run_program(const std::string& arguments);
+/// The same of another program.
+[[nodiscard]] Ran run_program_at(const std::string& program, const std::string& arguments);
 /// The program started without waiting; what it says goes to a file.
 pid_t start_program(const std::vector<std::string>& words, const std::filesystem::path& messages = "/dev/null");
 /// Waits until `file` is there; false after a minute.
