@@ -2,7 +2,6 @@
 
 #include "ao/gpu/device.h"
 #include "apps/frame/first_look.h"
-#include "apps/budget/map_set.h"
 #include "apps/compare/map_set.h"
 #include "io/images/image_file.h"
 #include "projection/attach.h"
