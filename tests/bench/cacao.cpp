@@ -22,6 +22,7 @@
 #include <map>
 #include <set>
 #include <span>
+#include <utility>
 
 namespace scanshade::bench {
 namespace {

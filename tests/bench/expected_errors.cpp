@@ -28,13 +28,6 @@ std::string scene_of(const std::string& capture) { return capture.substr(0, capt
 
 using Samples = std::map<SensorClass, std::vector<ErrorSample>>;
 
-/// One image: its RMS expected and found.
-struct FrameError {
-    std::string capture;
-    SensorClass sensor;
-    double expected, found;
-};
-
 class ExpectedErrorsPart final : public Part {
   public:
     Words words() override { return {"CAPTURE", "captures with truth", &captures_, 1, 1 << 20}; }
