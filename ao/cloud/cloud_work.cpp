@@ -247,7 +247,7 @@ void CloudWork::compute_thinned() {
     const auto [points, normals] = picked(kept);
     CloudAoOptions options = options_;
     options.keep_signs = false;
-    if (sides_.recorded_believed)
+    if (sides_.recorded_kept)
         options.normals = CloudNormals::recorded;
     const PointSet part{points, normals, {}, cloud_.z_up, cloud_.from_scanner};
     const CloudSetup setup{options, setup_.device, setup_.up, setup_.viewpoint};
@@ -338,8 +338,11 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
         doubt_lines(surface);
     const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
     std::optional<DiscRays> rays;
-    const std::vector<float> side_known =
-        whole_ ? sides_as_in_whole(surface) : sides_.settle(surface, rays, recorded());
+    std::vector<float> side_known;
+    if (!whole_)
+        side_known = sides_.settle(surface, rays, recorded());
+    else if (!whole_->recorded_kept)
+        side_known = sides_as_in_whole(surface);
     for (const std::uint32_t index : lonely)
         surface.normals[index].setZero();
     watch_.lap("sides");
@@ -498,7 +501,7 @@ CloudWork::Fitted CloudWork::planes_of(const Indices& which, CloudGpu* gpu) {
         fitted = without_noise(local, points, normals);
         watch_.lap("noise");
         if (gpu && fitted.empty() && !normals.empty() && !whole_)
-            sides_.judge_early(local, normals); // while the device works, the cores have time
+            sides_.object_early(local, normals); // while the device works, the cores have time
         return fitted.empty() ? cloud_surface(std::move(local), normals, gpu)
                               : cloud_surface(LocalCloud(fitted.points), fitted.normals, gpu, fitted.axes);
     };

@@ -51,7 +51,7 @@ struct WholeSize {
 /// The sides of a cloud of several tiles, settled once on a part of it, so that tiles agree.
 struct WholeSides {
     CloudSurface surface;
-    std::vector<float> known; ///< by index in the tree; empty where recorded sides are taken
+    std::vector<float> known; ///< by index in the tree; empty where recorded sides are kept
 };
 
 /// What a tile takes from the cloud that it is a part of.
@@ -60,6 +60,7 @@ struct OfWhole {
     std::optional<WholeSides> sides;
     std::optional<SharedNoise> noise; ///< none: it is not known, and nothing is smoothed
     bool normals_refused = false;     ///< recorded ones
+    bool recorded_kept = false;       ///< the sides of recorded normals stay
     bool twins = false;               ///< there are copies of points
 };
 

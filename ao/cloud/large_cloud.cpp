@@ -251,7 +251,7 @@ class LargeCloud {
         whole_.normals_refused = work.normals_refused();
         recorded_ =
             source_.has_normals() && setup_.options.normals != CloudNormals::estimated && !whole_.normals_refused;
-        recorded_believed_ = work.sides().recorded_believed;
+        whole_.recorded_kept = recorded_ && work.sides().recorded_kept;
         if (whole_.normals_refused)
             result_.notes.push_back(work.notes().back());
         told_sides_ = told_sides(work.sides(), recorded_);
@@ -378,7 +378,7 @@ class LargeCloud {
                 }
             }
             CloudAoOptions options = setup_.options;
-            if (recorded_believed_)
+            if (whole_.recorded_kept)
                 options.normals = CloudNormals::recorded;
             const CloudSetup setup{options, nullptr, setup_.up, setup_.viewpoint};
             const PointSet set{kept.points, kept.normals, {}, source_.z_up()};
@@ -474,7 +474,7 @@ class LargeCloud {
     Sorted sorted_;
     ThinnedCheck check_;
     std::size_t strays_tile_ = 0, check_tile_ = 0;
-    bool recorded_ = false, recorded_believed_ = false, by_sample_ = false;
+    bool recorded_ = false, by_sample_ = false;
     std::string told_sides_, told_error_;
     std::uint64_t largest_ = 0, twins_ = 0, unknown_ = 0, tiles_ = 0, gpu_tiles_ = 0;
     FittedCounts fitted_;
