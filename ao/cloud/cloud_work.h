@@ -41,6 +41,7 @@ struct CloudDecisions {
     NormalOrientation orientation;
     double radius = 0, spacing = 0;
     double points = 0; ///< of the whole, copies of points counted once
+    bool noise_exceeds_spacing = false;
 };
 
 /// The number of points in a cloud, of which those given are a sample.
@@ -122,7 +123,7 @@ class CloudWork {
     void settle_extent(std::vector<Eigen::Vector3d>& some);
     [[nodiscard]] bool beyond(const Eigen::Vector3d& point) const;
     [[nodiscard]] FittedCloud without_noise(const LocalCloud& local, std::span<const Eigen::Vector3d> points,
-                                            std::span<const Eigen::Vector3d> normals) const;
+                                            std::span<const Eigen::Vector3d> normals);
     [[nodiscard]] Picked picked(const Indices& indices) const;
     void compute_strays();
     [[nodiscard]] ThinnedCheck check_of_whole() const; ///< keep = 0: none
@@ -158,7 +159,7 @@ class CloudWork {
     Indices valid_, strays_;  ///< strays lie beyond the cloud
     Indices order_;           ///< the points in the order of the tree; empty where they were fitted
     std::vector<Twin> twins_; ///< copies of points, in neither
-    bool normals_refused_ = false;
+    bool normals_refused_ = false, noise_exceeds_spacing_ = false;
     FittedCounts fitted_;
     double error_by_check_ = 0;
     int gpu_tiles_ = 0, passes_ = 2;

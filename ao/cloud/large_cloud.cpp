@@ -55,12 +55,14 @@ struct Sorted {
     [[nodiscard]] std::string text() const {
         std::string bytes;
         put(bytes, valid), put(bytes, strays);
-        put(bytes, static_cast<std::uint64_t>(noise ? noise->noise.sigmas().size() : 0));
+        put(bytes, static_cast<std::uint8_t>(noise.has_value()));
         if (!noise)
             return bytes;
+        put(bytes, static_cast<std::uint64_t>(noise->noise.sigmas().size()));
         for (const double along : noise->middle)
             put(bytes, along);
         put(bytes, static_cast<std::uint8_t>(noise->sides));
+        put(bytes, static_cast<std::uint8_t>(noise->exceeds_spacing));
         for (std::size_t i = 0; i < noise->noise.sigmas().size(); ++i) {
             for (const float along : noise->noise.positions()[i])
                 put(bytes, along);
@@ -71,13 +73,13 @@ struct Sorted {
     [[nodiscard]] static Sorted from(std::string_view bytes) {
         Sorted sorted;
         sorted.valid = take<std::uint64_t>(bytes), sorted.strays = take<std::uint64_t>(bytes);
-        const auto count = take<std::uint64_t>(bytes);
-        if (count == 0)
+        if (take<std::uint8_t>(bytes) == 0)
             return sorted;
+        const auto count = take<std::uint64_t>(bytes);
         Vector3d middle;
         for (double& along : middle)
             along = take<double>(bytes);
-        const bool sides = take<std::uint8_t>(bytes) != 0;
+        const bool sides = take<std::uint8_t>(bytes) != 0, exceeds_spacing = take<std::uint8_t>(bytes) != 0;
         std::vector<Vector3f> positions;
         std::vector<float> sigmas;
         for (std::uint64_t i = 0; i < count; ++i) {
@@ -87,7 +89,7 @@ struct Sorted {
             positions.push_back(position);
             sigmas.push_back(take<float>(bytes));
         }
-        sorted.noise = {middle, CloudNoise(std::move(positions), std::move(sigmas)), sides};
+        sorted.noise = {middle, CloudNoise(std::move(positions), std::move(sigmas)), sides, exceeds_spacing};
         return sorted;
     }
 };
@@ -192,6 +194,7 @@ class LargeCloud {
             store_.decide(sorted_.text());
         }
         whole_.noise = sorted_.noise;
+        whole_.decisions.noise_exceeds_spacing = sorted_.noise && sorted_.noise->exceeds_spacing;
         watch_.lap("points into tiles");
     }
 

@@ -55,8 +55,8 @@ enum class SidesRule {
 
 /// How far recorded sides contradict each other: of the pairs of neighbours that continue each other smoothly, the
 /// share with opposite normals, weighted by smoothness. The two faces of a thin board do not count. Right sides have
-/// less than 0.3 % (axes 30 degrees off), whatever the noise, one inverted frame of 20 has 10 %, random signs have 50
-/// %.
+/// less than 0.3 % (axes 30 degrees off), whatever the noise, one inverted frame of 20 has 10 %, random signs have 40
+/// to 50 %. Only flat places count: leaves are none.
 [[nodiscard]] double contradiction(const CloudSurface& surface);
 
 /// Recorded sides made consistent, piece by piece.
