@@ -67,7 +67,8 @@ CloudWork::CloudWork(const CloudSetup& setup, const PointSet& sample, const std:
 CloudWork::CloudWork(const CloudSetup& setup, const PointSet& cloud, const std::optional<Vector3d>& scanner,
                      const CloudDecisions& whole)
     : setup_(setup), options_(setup.options), scanner_(scanner), cloud_(cloud), part_(true), watch_(result_.timings),
-      sides_(setup.options, setup.up, cloud.z_up), extent_(whole.extent) {
+      sides_(setup.options, setup.up, cloud.z_up), extent_(whole.extent),
+      noise_exceeds_spacing_(whole.noise_exceeds_spacing) {
     if (setup.device)
         gpu_.emplace(*setup.device);
     if (cloud.from_scanner)
@@ -151,7 +152,12 @@ WholeSides CloudWork::settle_sides() {
 }
 
 CloudDecisions CloudWork::decisions() const {
-    return {extent_, sides_.orientation, result_.radius, result_.spacing, static_cast<double>(valid_.size())};
+    return {extent_,
+            sides_.orientation,
+            result_.radius,
+            result_.spacing,
+            static_cast<double>(valid_.size()),
+            noise_exceeds_spacing_};
 }
 
 PointVisibility CloudWork::of_strays(const CloudSetup& setup, const PointSet& strays,
@@ -247,7 +253,7 @@ void CloudWork::compute_thinned() {
     const auto [points, normals] = picked(kept);
     CloudAoOptions options = options_;
     options.keep_signs = false;
-    if (sides_.recorded_believed)
+    if (sides_.recorded_kept)
         options.normals = CloudNormals::recorded;
     const PointSet part{points, normals, {}, cloud_.z_up, cloud_.from_scanner};
     const CloudSetup setup{options, setup_.device, setup_.up, setup_.viewpoint};
@@ -338,8 +344,11 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
         doubt_lines(surface);
     const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
     std::optional<DiscRays> rays;
-    const std::vector<float> side_known =
-        whole_ ? sides_as_in_whole(surface) : sides_.settle(surface, rays, recorded());
+    std::vector<float> side_known;
+    if (!whole_)
+        side_known = sides_.settle(surface, rays, recorded());
+    else if (!whole_->recorded_kept)
+        side_known = sides_as_in_whole(surface);
     for (const std::uint32_t index : lonely)
         surface.normals[index].setZero();
     watch_.lap("sides");
@@ -498,7 +507,7 @@ CloudWork::Fitted CloudWork::planes_of(const Indices& which, CloudGpu* gpu) {
         fitted = without_noise(local, points, normals);
         watch_.lap("noise");
         if (gpu && fitted.empty() && !normals.empty() && !whole_)
-            sides_.judge_early(local, normals); // while the device works, the cores have time
+            sides_.object_early(local, normals); // while the device works, the cores have time
         return fitted.empty() ? cloud_surface(std::move(local), normals, gpu)
                               : cloud_surface(LocalCloud(fitted.points), fitted.normals, gpu, fitted.axes);
     };
@@ -527,6 +536,9 @@ CloudWork::Fitted CloudWork::planes_of(const Indices& which, CloudGpu* gpu) {
             surface.stands_for[i] = count[surface.tree.original(i)];
             if (fitted.alone[surface.tree.original(i)])
                 surface.disc_radius[i] = 0;
+            else if (!fitted.largest_disc.empty())
+                surface.disc_radius[i] =
+                    std::min(surface.disc_radius[i], fitted.largest_disc[surface.tree.original(i)]);
         }
     }
     return {std::move(surface), std::move(fitted)};
@@ -534,15 +546,16 @@ CloudWork::Fitted CloudWork::planes_of(const Indices& which, CloudGpu* gpu) {
 
 /// Noise of the cloud, which a tile is told, and another part of a cloud finds by itself.
 FittedCloud CloudWork::without_noise(const LocalCloud& local, std::span<const Vector3d> points,
-                                     std::span<const Vector3d> normals) const {
+                                     std::span<const Vector3d> normals) {
     const ThinningGrid grid = thinning_grid(extent_.centre, result_.spacing);
     const double radius = options_.sky ? 10 * result_.spacing : result_.radius;
     if (part_ && !whole_)
-        return fitted_cloud(local, points, normals, radius, grid);
+        return fitted_cloud(local, points, normals, radius, grid, noise_exceeds_spacing_);
     const std::optional<SharedNoise> noise =
         whole_ ? whole_->noise
                : noise_at(noise_places(cloud_.points, valid_), local, normals, look_for_noise(radius, result_.spacing));
-    return noise ? fitted_cloud(local, points, normals, *noise, grid) : FittedCloud();
+    noise_exceeds_spacing_ = noise && noise->exceeds_spacing;
+    return noise ? fitted_cloud(local, points, normals, radius, *noise, grid) : FittedCloud();
 }
 
 /// Whether recorded normals are used.

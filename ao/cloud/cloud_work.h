@@ -41,6 +41,7 @@ struct CloudDecisions {
     NormalOrientation orientation;
     double radius = 0, spacing = 0;
     double points = 0; ///< of the whole, copies of points counted once
+    bool noise_exceeds_spacing = false;
 };
 
 /// The number of points in a cloud, of which those given are a sample.
@@ -51,7 +52,7 @@ struct WholeSize {
 /// The sides of a cloud of several tiles, settled once on a part of it, so that tiles agree.
 struct WholeSides {
     CloudSurface surface;
-    std::vector<float> known; ///< by index in the tree; empty where recorded sides are taken
+    std::vector<float> known; ///< by index in the tree; empty where recorded sides are kept
 };
 
 /// What a tile takes from the cloud that it is a part of.
@@ -60,6 +61,7 @@ struct OfWhole {
     std::optional<WholeSides> sides;
     std::optional<SharedNoise> noise; ///< none: it is not known, and nothing is smoothed
     bool normals_refused = false;     ///< recorded ones
+    bool recorded_kept = false;       ///< the sides of recorded normals stay
     bool twins = false;               ///< there are copies of points
 };
 
@@ -121,7 +123,7 @@ class CloudWork {
     void settle_extent(std::vector<Eigen::Vector3d>& some);
     [[nodiscard]] bool beyond(const Eigen::Vector3d& point) const;
     [[nodiscard]] FittedCloud without_noise(const LocalCloud& local, std::span<const Eigen::Vector3d> points,
-                                            std::span<const Eigen::Vector3d> normals) const;
+                                            std::span<const Eigen::Vector3d> normals);
     [[nodiscard]] Picked picked(const Indices& indices) const;
     void compute_strays();
     [[nodiscard]] ThinnedCheck check_of_whole() const; ///< keep = 0: none
@@ -157,7 +159,7 @@ class CloudWork {
     Indices valid_, strays_;  ///< strays lie beyond the cloud
     Indices order_;           ///< the points in the order of the tree; empty where they were fitted
     std::vector<Twin> twins_; ///< copies of points, in neither
-    bool normals_refused_ = false;
+    bool normals_refused_ = false, noise_exceeds_spacing_ = false;
     FittedCounts fitted_;
     double error_by_check_ = 0;
     int gpu_tiles_ = 0, passes_ = 2;

@@ -55,12 +55,14 @@ struct Sorted {
     [[nodiscard]] std::string text() const {
         std::string bytes;
         put(bytes, valid), put(bytes, strays);
-        put(bytes, static_cast<std::uint64_t>(noise ? noise->noise.sigmas().size() : 0));
+        put(bytes, static_cast<std::uint8_t>(noise.has_value()));
         if (!noise)
             return bytes;
+        put(bytes, static_cast<std::uint64_t>(noise->noise.sigmas().size()));
         for (const double along : noise->middle)
             put(bytes, along);
         put(bytes, static_cast<std::uint8_t>(noise->sides));
+        put(bytes, static_cast<std::uint8_t>(noise->exceeds_spacing));
         for (std::size_t i = 0; i < noise->noise.sigmas().size(); ++i) {
             for (const float along : noise->noise.positions()[i])
                 put(bytes, along);
@@ -71,13 +73,13 @@ struct Sorted {
     [[nodiscard]] static Sorted from(std::string_view bytes) {
         Sorted sorted;
         sorted.valid = take<std::uint64_t>(bytes), sorted.strays = take<std::uint64_t>(bytes);
-        const auto count = take<std::uint64_t>(bytes);
-        if (count == 0)
+        if (take<std::uint8_t>(bytes) == 0)
             return sorted;
+        const auto count = take<std::uint64_t>(bytes);
         Vector3d middle;
         for (double& along : middle)
             along = take<double>(bytes);
-        const bool sides = take<std::uint8_t>(bytes) != 0;
+        const bool sides = take<std::uint8_t>(bytes) != 0, exceeds_spacing = take<std::uint8_t>(bytes) != 0;
         std::vector<Vector3f> positions;
         std::vector<float> sigmas;
         for (std::uint64_t i = 0; i < count; ++i) {
@@ -87,7 +89,7 @@ struct Sorted {
             positions.push_back(position);
             sigmas.push_back(take<float>(bytes));
         }
-        sorted.noise = {middle, CloudNoise(std::move(positions), std::move(sigmas)), sides};
+        sorted.noise = {middle, CloudNoise(std::move(positions), std::move(sigmas)), sides, exceeds_spacing};
         return sorted;
     }
 };
@@ -192,6 +194,7 @@ class LargeCloud {
             store_.decide(sorted_.text());
         }
         whole_.noise = sorted_.noise;
+        whole_.decisions.noise_exceeds_spacing = sorted_.noise && sorted_.noise->exceeds_spacing;
         watch_.lap("points into tiles");
     }
 
@@ -251,7 +254,7 @@ class LargeCloud {
         whole_.normals_refused = work.normals_refused();
         recorded_ =
             source_.has_normals() && setup_.options.normals != CloudNormals::estimated && !whole_.normals_refused;
-        recorded_believed_ = work.sides().recorded_believed;
+        whole_.recorded_kept = recorded_ && work.sides().recorded_kept;
         if (whole_.normals_refused)
             result_.notes.push_back(work.notes().back());
         told_sides_ = told_sides(work.sides(), recorded_);
@@ -378,7 +381,7 @@ class LargeCloud {
                 }
             }
             CloudAoOptions options = setup_.options;
-            if (recorded_believed_)
+            if (whole_.recorded_kept)
                 options.normals = CloudNormals::recorded;
             const CloudSetup setup{options, nullptr, setup_.up, setup_.viewpoint};
             const PointSet set{kept.points, kept.normals, {}, source_.z_up()};
@@ -474,7 +477,7 @@ class LargeCloud {
     Sorted sorted_;
     ThinnedCheck check_;
     std::size_t strays_tile_ = 0, check_tile_ = 0;
-    bool recorded_ = false, recorded_believed_ = false, by_sample_ = false;
+    bool recorded_ = false, by_sample_ = false;
     std::string told_sides_, told_error_;
     std::uint64_t largest_ = 0, twins_ = 0, unknown_ = 0, tiles_ = 0, gpu_tiles_ = 0;
     FittedCounts fitted_;

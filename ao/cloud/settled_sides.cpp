@@ -12,8 +12,7 @@ using Eigen::Vector3d, Eigen::Vector3f;
 
 namespace {
 
-constexpr std::size_t enough = 100000; ///< points to judge recorded sides by
-constexpr float sure = 0.8F;
+constexpr std::size_t enough = 100000; ///< points to ask whether recorded sides may be right
 
 /// Part of a cloud, evenly chosen, with the normals that it has.
 struct Part {
@@ -35,6 +34,7 @@ Part part_of(const NeighbourTree& tree, const Vector3d& middle, const Normal& no
 
 /// The share of sure sides that oppose the normals as they are; 0 where too few are sure.
 double opposed_share(const CloudSurface& surface, const Sides& found) {
+    constexpr float sure = 0.8F;
     double opposed = 0, all = 0;
     for (std::size_t i = 0; i < surface.size(); ++i)
         if (found.confidence[i] > sure && !surface.normals[i].isZero()) {
@@ -45,13 +45,7 @@ double opposed_share(const CloudSurface& surface, const Sides& found) {
     return all > enough_sure * static_cast<double>(surface.size()) ? opposed / all : 0;
 }
 
-/// Where scanners could have stood that see recorded fronts as well as those found, who recorded them knew better.
-bool as_good(const Sides& found) {
-    constexpr double tie = 0.05;
-    return !found.sure && found.explained_as_given && *found.explained_as_given > *found.explained - tie;
-}
-
-constexpr double hardly_random = 0.05, some_opposed = 0.05;
+constexpr double hardly_opposed = 0.05, nearly_all_opposed = 0.9;
 
 } // namespace
 
@@ -117,110 +111,118 @@ void SettledSides::decide_by_scanner(const CloudSurface& surface, Sides& found) 
             sign = static_cast<std::int8_t>(-sign);
 }
 
-bool SettledSides::look_right(const CloudSurface& surface, const Patches& patches,
-                              std::optional<DiscRays>& rays) const {
+std::optional<std::string> SettledSides::objection(const CloudSurface& surface, std::optional<DiscRays>& rays) const {
+    const bool viewed = orientation.kind == NormalOrientation::Kind::viewpoint;
+    const Patches patches = patches_of(surface);
+    const auto objects = [&](const SidesEffort& effort) {
+        constexpr double tie = 0.05; // of the points
+        const Sides found = found_in(surface, patches, rays, effort);
+        const bool as_good =
+            !found.sure && found.explained_as_given && *found.explained_as_given > *found.explained - tie;
+        return !found.doubt && !as_good && opposed_share(surface, found) > nearly_all_opposed;
+    };
     constexpr SidesEffort quick{4000, 60, 300, true};
-    if (recorded_sides(surface, patches).random > hardly_random)
-        return false;
-    const Sides found = found_in(surface, patches, rays, quick);
-    return as_good(found) || opposed_share(surface, found) <= some_opposed;
+    if (!objects(quick) || (!viewed && !objects({.given_too = true})))
+        return std::nullopt;
+    if (z_up_)
+        return "most of the recorded normals look down, though the cloud seems to be seen from above; they are kept: "
+               "--cloud.outside up turns them, --cloud.normals recorded is sure of them.";
+    if (orientation.kind == NormalOrientation::Kind::terrain) // z may point anywhere
+        return std::nullopt;
+    return fmt::format("nearly all recorded normals face away from {}; they are kept: --cloud.outside turns them, "
+                       "--cloud.normals recorded is sure of them.",
+                       viewed ? orientation.why : "where scanners could have stood");
 }
 
-bool SettledSides::judged_by_part(std::size_t points) const {
+bool SettledSides::asks_part(std::size_t points) const {
     return options_.normals == CloudNormals::automatic && options_.outside == "auto" && points > 2 * enough;
 }
 
-void SettledSides::judge_early(const LocalCloud& points, std::span<const Vector3d> normals) {
-    if (!judged_by_part(points.size()))
+void SettledSides::object_early(const LocalCloud& points, std::span<const Vector3d> normals) {
+    if (!asks_part(points.size()))
         return;
     Part part = part_of(points.tree, points.middle, [&](std::size_t i) { return normals[points.tree.original(i)]; });
     early_ = std::async(std::launch::async, [this, part = std::move(part)] {
         const CloudSurface surface = part.surface();
         std::optional<DiscRays> rays;
-        return look_right(surface, patches_of(surface), rays);
+        return objection(surface, rays);
     });
 }
 
-/// Recorded sides are right as a rule. Random ones show within patches; patches turned over, or all, show in where
-/// a scanner could have stood.
-std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::optional<DiscRays>& rays) {
-    constexpr double mostly_random = 0.2, all_opposed = 0.9;
-    if (options_.normals != CloudNormals::automatic)
-        return {};
-    const bool told = options_.outside != "auto";
-    if (judged_by_part(surface.size())) {
-        const auto by_part = [&] {
-            const CloudSurface some = part_of(surface.tree, surface.middle, [&](std::size_t i) {
-                                          return Vector3d(surface.normals[i].cast<double>());
-                                      }).surface();
-            std::optional<DiscRays> rays_of_some;
-            return look_right(some, patches_of(some), rays_of_some);
-        };
-        recorded_believed = early_.valid() ? early_.get() : by_part();
-        if (recorded_believed)
-            return {};
-    }
-    const Patches patches = patches_of(surface);
-    if (!told && !judged_by_part(surface.size())) {
-        recorded_believed = look_right(surface, patches, rays);
-        if (recorded_believed)
-            return {};
-    }
-    const RecordedSides order = recorded_sides(surface, patches);
-    const bool in_order = order.random <= hardly_random;
-    SidesEffort thorough;
-    thorough.given_too = in_order && !told;
-    Sides found = found_in(surface, patches, rays, thorough);
-    double opposed = opposed_share(surface, found);
-    if (thorough.given_too && orientation.kind == NormalOrientation::Kind::viewpoint && opposed > some_opposed &&
-        opposed < all_opposed) {
-        // Nearly everything is seen first from the foot of a table, too, where no scanner stood.
-        if (!rays)
-            rays.emplace(surface);
-        const Sides free = sides_of(surface, patches, &*rays, {}, SidesRule::automatic, thorough);
-        if (as_good(free) || opposed_share(surface, free) <= some_opposed)
-            opposed = 0;
-    }
-    recorded_believed = in_order && !told && (as_good(found) || opposed <= some_opposed);
-    if (recorded_believed)
-        return {};
-    if (constexpr double clearly = 0.3; in_order && !told && opposed > all_opposed && found.margin < clearly) {
-        const bool viewed = orientation.kind == NormalOrientation::Kind::viewpoint;
-        if (z_up_)
-            doubts.push_back(
-                fmt::format("{:.0f} % of the recorded normals look down, though the cloud seems to be seen from "
-                            "above; they are kept: --cloud.outside up turns them, --cloud.normals recorded is "
-                            "sure of them.",
-                            100 * opposed));
-        else if (orientation.kind != NormalOrientation::Kind::terrain && !found.doubt) // z may point anywhere
-            doubts.push_back(
-                fmt::format("{:.0f} % of the recorded normals face away from {}; they are kept: --cloud.outside "
-                            "turns them, --cloud.normals recorded is sure of them.",
-                            100 * opposed, viewed ? orientation.why : "where scanners could have stood"));
-        return {};
-    }
-    const bool all = in_order || told || order.random > mostly_random;
-    std::size_t turned = 0;
+void SettledSides::turn(CloudSurface& surface, std::span<const std::int8_t> sign, std::string why) {
     for (std::size_t i = 0; i < surface.size(); ++i)
-        if (found.sign[i] < 0 && (all || found.confidence[i] > sure) && !surface.normals[i].isZero()) {
+        if (sign[i] < 0 && !surface.normals[i].isZero()) {
             surface.normals[i] = -surface.normals[i];
-            ++turned;
+            ++turned_points;
         }
-    turned_points += turned;
     judged_points += surface.size();
-    if (told)
-        turned_why = "--cloud.outside says so";
-    else if (in_order)
-        turned_why = fmt::format("where sides are sure, {:.0f} % of them opposed them", 100 * opposed);
-    else
-        turned_why = fmt::format("{:.0f} % of the points lie in patches whose sides look random", 100 * order.random);
-    if (!told && (in_order || turned > surface.size() * 3 / 5))
-        doubts.push_back(fmt::format(
-            "{:.0f} % of the recorded normals face away from where scanners could have stood; they "
-            "were turned: --cloud.normals recorded keeps them.",
-            in_order ? 100 * opposed : 100 * static_cast<double>(turned) / static_cast<double>(surface.size())));
-    note(found);
-    return all ? std::move(found.confidence) : std::vector<float>();
+    turned_why = std::move(why);
+}
+
+/// Recorded sides stay unless they contradict each other on smooth patches. Where free space would have them otherwise,
+/// that errs more often: a place beneath a table sees as much as a camera in front of it.
+std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::optional<DiscRays>& rays) {
+    recorded_kept = options_.normals != CloudNormals::automatic;
+    if (recorded_kept)
+        return {};
+    if (options_.outside != "auto") {
+        Sides found = found_in(surface, patches_of(surface), rays);
+        turn(surface, found.sign, "--cloud.outside says so");
+        note(found);
+        return std::move(found.confidence);
+    }
+    std::vector<float> known;
+    constexpr double contradictory = 0.005;
+    recorded_kept = contradiction(surface) < contradictory;
+    if (!recorded_kept) {
+        RepairedSides repaired = repaired_sides(surface);
+        Sides found;
+        if (repaired.undecided > 0) {
+            found = found_in(surface, patches_of(surface), rays);
+            decide_by_scanner(surface, found);
+        }
+        if (constexpr double mostly = 0.5; repaired.undecided > mostly) {
+            turn(surface, found.sign, "their sides look random");
+            note(found);
+            return std::move(found.confidence);
+        }
+        // Parts without a smooth pair to others keep what was recorded, which was wrong as often as elsewhere.
+        known.assign(surface.size(), static_cast<float>(1 - 2 * repaired.turned));
+        for (std::size_t i = 0; i < surface.size(); ++i)
+            if (repaired.sign[i] == 0)
+                repaired.sign[i] = found.sign[i], known[i] = found.confidence[i];
+        turn(surface, repaired.sign, "they opposed most of their neighbours");
+    }
+    if (orientation.kind == NormalOrientation::Kind::viewpoint && !orientation.point.isZero()) {
+        // All is seen from the recorded position, unless it is another's, as in merged scans. Free space tells.
+        Sides seen = sides_to(surface, (orientation.point - surface.middle).cast<float>());
+        const double opposed = opposed_share(surface, seen);
+        if (opposed > hardly_opposed && opposed < nearly_all_opposed) {
+            if (!rays)
+                rays.emplace(surface);
+            if (opposed_share(surface, sides_of(surface, patches_of(surface), &*rays, {})) > hardly_opposed) {
+                recorded_kept = false;
+                turn(surface, seen.sign, fmt::format("{:.0f} % of them faced away from the scanner", 100 * opposed));
+                doubts.push_back(fmt::format("{:.0f} % of the recorded normals face away from {}; they were turned: "
+                                             "--cloud.normals recorded keeps them.",
+                                             100 * opposed, orientation.why));
+                return std::move(seen.confidence);
+            }
+        }
+    }
+    const auto of_part = [&] {
+        const CloudSurface some = part_of(surface.tree, surface.middle, [&](std::size_t i) {
+                                      return Vector3d(surface.normals[i].cast<double>());
+                                  }).surface();
+        std::optional<DiscRays> rays_of_some;
+        return objection(some, rays_of_some);
+    };
+    const std::optional<std::string> doubt = !asks_part(surface.size())        ? objection(surface, rays)
+                                             : early_.valid() && recorded_kept ? early_.get()
+                                                                               : of_part();
+    if (doubt)
+        doubts.push_back(*doubt);
+    return known;
 }
 
 void SettledSides::note(const Sides& found) {

@@ -25,11 +25,11 @@ class SettledSides {
     std::size_t turned_points = 0;            ///< whose recorded normals were turned
     std::size_t judged_points = 0;            ///< of the surfaces where some were
     std::string turned_why;
-    bool recorded_believed = false; ///< recorded sides were looked at, and are right
+    bool recorded_kept = false; ///< all of them
 
-    /// Begins to judge recorded sides by a part of the points, beside other work, where settle() will need that first.
-    /// `normals`: the recorded ones of these points.
-    void judge_early(const LocalCloud& points, std::span<const Eigen::Vector3d> normals);
+    /// Begins to look for what objects to recorded sides, by a part of the points, beside other work. `normals`: the
+    /// recorded ones of these points.
+    void object_early(const LocalCloud& points, std::span<const Eigen::Vector3d> normals);
 
     /// Turns the normals to the sides that were scanned. Returns how sure that is, 0 .. 1, by index in the tree; empty
     /// where the recorded sides are taken. `rays` are made of the surface if they are needed. `recorded`: the normals
@@ -39,20 +39,23 @@ class SettledSides {
   private:
     [[nodiscard]] Sides found_in(const CloudSurface& surface, const Patches& patches, std::optional<DiscRays>& rays,
                                  const SidesEffort& effort = {}) const;
-    /// Whether a quick look at recorded sides finds nothing wrong. `rays` as for settle().
-    [[nodiscard]] bool look_right(const CloudSurface& surface, const Patches& patches,
-                                  std::optional<DiscRays>& rays) const;
-    /// Whether recorded sides are judged by a part of so many points first.
-    [[nodiscard]] bool judged_by_part(std::size_t points) const;
+    /// A sentence where nearly all recorded sides face away from where scanners could have stood. `rays` as for
+    /// settle().
+    [[nodiscard]] std::optional<std::string> objection(const CloudSurface& surface,
+                                                       std::optional<DiscRays>& rays) const;
+    /// Of clouds of so many points, only a part is asked.
+    [[nodiscard]] bool asks_part(std::size_t points) const;
     /// Where both sides would do, that to the scanner is right.
     void decide_by_scanner(const CloudSurface& surface, Sides& found) const;
+    /// Turns normals with sign -1, for the reason given.
+    void turn(CloudSurface& surface, std::span<const std::int8_t> sign, std::string why);
     std::vector<float> settle_recorded(CloudSurface& surface, std::optional<DiscRays>& rays);
     void note(const Sides& found);
 
     const CloudAoOptions& options_;
     Eigen::Vector3d up_;
     bool z_up_;
-    std::future<bool> early_; ///< what judge_early() began
+    std::future<std::optional<std::string>> early_; ///< what object_early() began
 };
 
 } // namespace scanshade

@@ -191,6 +191,17 @@ TEST(CloudAo, noise_of_a_scanner_hardly_costs_accuracy) {
     EXPECT_LT(error(0.010), clean + 0.03);
 }
 
+/// Three visits of each surface, each with noise twice the spacing: merged depth frames.
+TEST(CloudAo, noise_larger_than_the_spacing_costs_little) {
+    const scene::World world(scene::scene_named("office"));
+    const auto cloud = scene::scanned_cloud(world, 150000, {.stations = 6, .noise_m = 0.025});
+    const auto truth = scene::true_visibility(world, cloud, {.radius_m = 0.5, .rays = 256}, 8);
+    for (const bool recorded : {true, false}) {
+        const auto found = visibility(cloud.points, {.radius = 0.5}, recorded ? cloud.normals : Points());
+        EXPECT_LT(rms_between(found.visibility, truth), recorded ? 0.08 : 0.12);
+    }
+}
+
 /// From scarce even points to many scanned ones, true errors lie between 0.03 and 0.2.
 TEST(CloudAo, the_expected_error_is_near_the_true_one) {
     for (const char* name : {"office", "columns", "outdoor"})

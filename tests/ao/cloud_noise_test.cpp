@@ -1,5 +1,6 @@
 // The noise of a cloud: measured, thinned and taken away; what is no noise stays.
 #include "ao/cloud/extent.h"
+#include "ao/cloud/surface/cleaned_cloud.h"
 #include "ao/cloud/surface/cloud_noise.h"
 #include "ao/cloud/surface/fitted_cloud.h"
 #include "tests/support/points.h"
@@ -105,6 +106,99 @@ TEST(FittedCloud, sheets_do_not_merge) {
     for (const Vector3d& p : found.points)
         between += std::abs(p.z() - thickness / 2) < thickness / 4;
     EXPECT_LT(static_cast<double>(between), 0.05 * static_cast<double>(found.points.size()));
+}
+
+/// Slabs of noise larger than the spacing: a plane, or both faces of a board, thicker than their distance is told only
+/// by recorded normals.
+struct Slabs {
+    const char* name;
+    double sigma, apart; ///< of the points; of two faces, 0 = one
+    bool normals;
+};
+class CleanedCloud : public testing::TestWithParam<Slabs> {
+  protected:
+    static constexpr std::size_t count = 60000; // 8 mm apart
+    CleanedCloud() : points(square(count, GetParam().sigma)) {
+        for (std::size_t i = 0; i < count; ++i) {
+            const double side = GetParam().apart > 0 && i % 2 ? -1 : 1;
+            points[i].z() += side * GetParam().apart / 2;
+            normals.emplace_back(0, 0, side);
+        }
+    }
+    [[nodiscard]] FittedCloud cleaned() const {
+        return cleaned_cloud(LocalCloud(points), points, GetParam().normals ? normals : Points(), GetParam().normals,
+                             0.5, thinning_grid(Vector3d::Zero(), 0.008));
+    }
+    Points points, normals;
+};
+
+TEST_P(CleanedCloud, lies_on_its_surfaces) {
+    const FittedCloud cloud = cleaned();
+    ASSERT_FALSE(cloud.empty());
+    double squares = 0, own_side = 0;
+    for (const Vector3d& point : cloud.points)
+        squares += std::pow(std::abs(point.z()) - GetParam().apart / 2, 2);
+    EXPECT_LT(std::sqrt(squares / static_cast<double>(cloud.points.size())), 0.35 * GetParam().sigma)
+        << "raw points have one sigma";
+    for (std::size_t i = 0; i < count; ++i)
+        own_side += cloud.points[cloud.fitted_of[i]].z() * normals[i].z() >= 0 || GetParam().apart == 0;
+    EXPECT_GT(own_side / count, GetParam().normals ? 0.997 : 0.95) << "points stay on their face";
+    EXPECT_NEAR(static_cast<double>(cloud.noise), GetParam().sigma, 0.2 * GetParam().sigma);
+    EXPECT_LT(cloud.points.size(), count / 2) << "discs are as far apart as the noise is large";
+    EXPECT_GT(static_cast<double>(cloud.moved), 0.98 * count);
+    ASSERT_EQ(cloud.largest_disc.size(), cloud.points.size());
+    for (const float radius : cloud.largest_disc)
+        ASSERT_LT(radius, 6 * std::max(GetParam().sigma, 0.008));
+}
+
+TEST_P(CleanedCloud, is_the_same_each_time) {
+    const FittedCloud one = cleaned(), other = cleaned();
+    EXPECT_EQ(one.points, other.points);
+    EXPECT_EQ(one.fitted_of, other.fitted_of);
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, CleanedCloud,
+                         testing::Values(Slabs{"a_plane", 0.02, 0, false}, Slabs{"a_plane_with_normals", 0.02, 0, true},
+                                         Slabs{"two_sheets", 0.01, 0.15, false},
+                                         Slabs{"a_board_thinner_than_its_noise", 0.02, 0.03, true}),
+                         [](const auto& info) { return info.param.name; });
+
+/// Flying pixels between two surfaces make no discs, and have a value all the same.
+TEST(CleanedCloud, makes_no_discs_of_points_that_no_plane_explains) {
+    Points points = square(60000, 0.012);
+    const std::size_t on_surface = points.size();
+    Dice dice(9);
+    for (int i = 0; i < 1500; ++i)
+        points.emplace_back(0.8 * dice.roll(), 2 * dice.roll() - 1, 0.1 + 0.8 * dice.roll());
+    const FittedCloud cloud =
+        cleaned_cloud(LocalCloud(points), points, {}, false, 0.5, thinning_grid(Vector3d::Zero(), 0.008));
+    std::size_t flying = 0;
+    for (const Vector3d& point : cloud.points)
+        flying += point.z() > 0.06;
+    EXPECT_LT(flying, 75U) << "a twentieth of them";
+    ASSERT_EQ(cloud.fitted_of.size(), points.size());
+    for (std::size_t i = on_surface; i < points.size(); ++i)
+        ASSERT_LT(cloud.fitted_of[i], cloud.points.size());
+}
+
+TEST(CleanedCloud, is_asked_for_where_noise_exceeds_the_spacing) {
+    for (const auto& [sigma, exceeds] : {std::pair{0.0, false}, {0.0015, false}, {0.012, true}}) {
+        const Points points = square(60000, sigma); // 8 mm apart
+        const LocalCloud local(points);
+        std::vector<NoisePlace> places;
+        for (std::uint32_t i = 0; i < 64; ++i)
+            places.push_back({i, points[i]});
+        const NoiseLook look = look_for_noise(0.5, 0.008);
+        const auto whole = noise_at(places, local, {}, look);
+        ASSERT_TRUE(whole);
+        EXPECT_EQ(whole->exceeds_spacing, exceeds) << sigma;
+        NoisePlaces passing(places, look);
+        for (std::uint32_t i = 0; i < points.size(); ++i)
+            passing.add(i, points[i], nullptr);
+        const auto streamed = passing.measured();
+        ASSERT_TRUE(streamed);
+        EXPECT_EQ(streamed->exceeds_spacing, exceeds) << sigma << ": tiles decide as the whole does";
+    }
 }
 
 TEST(Extent, is_that_of_the_cloud_and_not_of_its_strays) {

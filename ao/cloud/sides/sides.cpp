@@ -42,7 +42,7 @@ struct Decision {
     bool lost = false; ///< no station sees clean fronts
     std::vector<std::size_t> chosen;
     std::string why{};
-    double margin = 0, explained = 0;
+    double explained = 0;
     bool sure = false;
     std::optional<std::string> doubt{};
 };
@@ -114,7 +114,6 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
         decision.sure = !decision.doubt;
     } else {
         decision.sign = covered;
-        decision.margin = margin;
         decision.why = "to where a scanner could stand: " + explained(covered);
         const bool sure_body = covered == -inner && afar > 0.97 && boxed < hardly_walled;
         if (margin < near_tie && !sure_body && !(covered == inner && boxed > walled))
@@ -314,7 +313,6 @@ Sides sides_of(const CloudSurface& surface, const Patches& patches, const DiscRa
     }();
     sides.why = decision.why;
     sides.doubt = decision.doubt;
-    sides.margin = decision.margin;
     sides.sure = decision.sure;
     if (as_given) {
         sides.explained = decision.explained;

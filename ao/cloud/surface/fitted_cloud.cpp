@@ -1,6 +1,7 @@
 // Thinning, plane fits over windows that follow the noise, and projection (after "moving least squares" surfaces).
 #include "ao/cloud/surface/fitted_cloud.h"
 
+#include "ao/cloud/surface/cleaned_cloud.h"
 #include "ao/cloud/surface/cloud_noise.h"
 #include "ao/cloud/surface/moments.h"
 #include "projection/base/statistics.h"
@@ -41,12 +42,6 @@ struct Cells {
     std::vector<Cell> all;
     Indices members;
 };
-
-/// Zero where there is none.
-Vector3f unit_normal(const Vector3d& normal) {
-    return normal.allFinite() && normal.norm() > 0.1 ? Vector3f(normal.normalized().cast<float>())
-                                                     : Vector3f(Vector3f::Zero());
-}
 
 /// Halves the points of each box of a grid until each part is a cell.
 class Thinning {
@@ -534,7 +529,7 @@ FittedCloud fitted_by(const CloudNoise& noise, bool sides, const LocalCloud& loc
 } // namespace
 
 FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> points, std::span<const Vector3d> normals,
-                         double radius, const ThinningGrid& grid) {
+                         double radius, const ThinningGrid& grid, bool exceeds_spacing) {
     if (points.size() < fewest_fitted)
         return {};
     constexpr std::size_t sample = 2000;
@@ -542,15 +537,19 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
     for (std::size_t k = 0; k < opposed.size(); ++k)
         opposed[k] = opposed_beside(local.tree, normals, (2 * k + 1) * local.size() / (2 * sample));
     const bool sides = !normals.empty() && sides_agree(opposed);
+    if (exceeds_spacing)
+        return cleaned_cloud(local, points, normals, sides, radius, grid);
     const CloudNoise noise(local.tree, static_cast<float>(radius) / 3, sides ? normals : std::span<const Vector3d>());
     return noise.known() ? fitted_by(noise, sides, local, points, normals, grid, (points.size() + 99) / 100)
                          : FittedCloud();
 }
 
 FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> points, std::span<const Vector3d> normals,
-                         const SharedNoise& noise, const ThinningGrid& grid) {
+                         double radius, const SharedNoise& noise, const ThinningGrid& grid) {
     if (points.size() < fewest_fitted)
         return {};
+    if (noise.exceeds_spacing)
+        return cleaned_cloud(local, points, normals, noise.sides, radius, grid);
     return fitted_by(noise.noise.moved(local.middle - noise.middle), noise.sides && !normals.empty(), local, points,
                      normals, grid, 1);
 }

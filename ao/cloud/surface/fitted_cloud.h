@@ -18,6 +18,7 @@ struct FittedCloud {
     std::vector<Eigen::Vector3d> normals; ///< the mean of the recorded ones; empty where none are given
     std::vector<Eigen::Vector3f> axes;    ///< fitted, not oriented; zero for points that no noise concerns
     std::vector<char> alone;              ///< 1: off all surfaces near it by more than noise explains
+    std::vector<float> largest_disc;      ///< radii that no disc may exceed; empty = any
     std::vector<std::uint32_t> fitted_of; ///< by point given: its index in `points`
     float noise = 0;                      ///< sigma across the surface, the median over the cloud, in its unit
     std::size_t moved = 0;                ///< points given that noise concerns
@@ -41,15 +42,15 @@ struct ThinningGrid {
 /// points, so that what noise is left is small against their spacing. Near edges, where a window holds two surfaces,
 /// the plane is that of a neighbour whose window is flat. Empty where that concerns less than a hundredth of the
 /// points. `local` is made of `points`; `normals` is empty or holds one per point. Noise is looked for in balls up to a
-/// third of `radius`.
+/// third of `radius`. `exceeds_spacing`: that of the cloud whose part these points are does; see SharedNoise.
 [[nodiscard]] FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Eigen::Vector3d> points,
                                        std::span<const Eigen::Vector3d> normals, double radius,
-                                       const ThinningGrid& grid);
+                                       const ThinningGrid& grid, bool exceeds_spacing = false);
 /// The same with noise that is known. However few points it concerns, they are moved: the points may be a part of a
-/// cloud whose other parts hold more.
+/// cloud whose other parts hold more. Noise that exceeds the spacing is left to cleaned_cloud().
 [[nodiscard]] FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Eigen::Vector3d> points,
-                                       std::span<const Eigen::Vector3d> normals, const SharedNoise& noise,
-                                       const ThinningGrid& grid);
+                                       std::span<const Eigen::Vector3d> normals, double radius,
+                                       const SharedNoise& noise, const ThinningGrid& grid);
 
 /// Whether the recorded normals of a point and of its nearest neighbour are opposed; nothing where it has none.
 [[nodiscard]] std::optional<bool> opposed_beside(const NeighbourTree& tree, std::span<const Eigen::Vector3d> normals,

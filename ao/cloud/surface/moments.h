@@ -34,6 +34,12 @@ struct PrincipalAxes {
     }
 };
 
+/// A recorded normal of length 1; zero where there is none.
+[[nodiscard]] inline Eigen::Vector3f unit_normal(const Eigen::Vector3d& normal) {
+    return normal.allFinite() && normal.norm() > 0.1 ? Eigen::Vector3f(normal.normalized().cast<float>())
+                                                     : Eigen::Vector3f(Eigen::Vector3f::Zero());
+}
+
 /// A recorded normal, or that of the flat surface round it, turned to the same side. The latter where they differ by
 /// more than 6 degrees: the normal was estimated from too few points then.
 [[nodiscard]] inline Eigen::Vector3f checked_normal(const Eigen::Vector3f& recorded, const Eigen::Vector3f& of_plane) {

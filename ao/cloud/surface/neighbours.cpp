@@ -237,8 +237,8 @@ void NeighbourTree::find_round(std::size_t index, std::size_t wanted, Nearest& f
     find(points_[index], index, wanted, found, reach2);
 }
 
-void NeighbourTree::find_near(const Vector3f& at, std::size_t wanted, Nearest& found) const {
-    find(at, size(), wanted, found, std::numeric_limits<float>::infinity());
+void NeighbourTree::find_near(const Vector3f& at, std::size_t wanted, Nearest& found, float reach2) const {
+    find(at, size(), wanted, found, reach2);
 }
 
 void NeighbourTree::find(const Vector3f& at, std::size_t but, std::size_t wanted, Nearest& found, float reach2) const {

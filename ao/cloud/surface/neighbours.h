@@ -57,8 +57,9 @@ class NeighbourTree {
     void find_round(std::size_t index, std::size_t wanted, Nearest& found,
                     float reach2 = std::numeric_limits<float>::infinity()) const;
 
-    /// The `wanted` points nearest to a position.
-    void find_near(const Eigen::Vector3f& at, std::size_t wanted, Nearest& found) const;
+    /// The `wanted` points nearest to a position. `reach2` as for find_round().
+    void find_near(const Eigen::Vector3f& at, std::size_t wanted, Nearest& found,
+                   float reach2 = std::numeric_limits<float>::infinity()) const;
 
     /// Calls `visit(index)` for every point within `reach` of `at`, in no particular order.
     template <class Visit>

@@ -1,9 +1,10 @@
 // Noise measured round places, on a whole cloud or on points gathered near them.
 #include "ao/cloud/surface/shared_noise.h"
 
-#include "ao/cloud/surface/fitted_cloud.h"
+#include "ao/cloud/surface/cleaned_cloud.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <tbb/parallel_for.h>
@@ -26,10 +27,12 @@ std::int64_t number_of(const Vector3d& scaled, const Vector3i& off) {
     return all;
 }
 
-std::optional<SharedNoise> known_noise(const Vector3d& middle, CloudNoise&& noise, bool sides) {
-    if (!noise.known())
+std::optional<SharedNoise> known_noise(const Vector3d& middle, CloudNoise&& noise, bool sides,
+                                       std::span<const std::optional<Slab>> slabs) {
+    const bool exceeds_spacing = noise_exceeds_spacing(slabs);
+    if (!noise.known() && !exceeds_spacing)
         return std::nullopt;
-    return SharedNoise{middle, std::move(noise), sides};
+    return SharedNoise{middle, std::move(noise), sides, exceeds_spacing};
 }
 
 } // namespace
@@ -53,8 +56,9 @@ std::optional<SharedNoise> noise_at(std::span<const NoisePlace> places, const Lo
     for (const std::size_t index : normals.empty() ? std::vector<std::size_t>() : indices)
         opposed.push_back(opposed_beside(cloud.tree, normals, index));
     const bool sides = !normals.empty() && sides_agree(opposed);
-    return known_noise(cloud.middle,
-                       CloudNoise(cloud.tree, look, sides ? normals : std::span<const Vector3d>(), indices), sides);
+    const std::span<const Vector3d> facing = sides ? normals : std::span<const Vector3d>();
+    return known_noise(cloud.middle, CloudNoise(cloud.tree, look, facing, indices), sides,
+                       slabs_round(cloud.tree, facing, indices, look.reach));
 }
 
 NoisePlaces::NoisePlaces(std::span<const NoisePlace> places, const NoiseLook& look) : look_(look) {
@@ -147,11 +151,14 @@ std::optional<SharedNoise> NoisePlaces::measured() const {
         });
         sides = sides_agree(opposed);
     }
+    std::vector<std::optional<Slab>> slabs(rounds.size());
     each([&](std::size_t k, const NeighbourTree& tree, const std::vector<Vector3d>& normals, std::size_t own) {
-        found[k] = noise_round(tree, sides ? normals : std::span<const Vector3d>(), own, look_);
+        const std::span<const Vector3d> facing = sides ? normals : std::span<const Vector3d>();
+        found[k] = noise_round(tree, facing, own, look_);
+        slabs[k] = slabs_round(tree, facing, std::array{own}, look_.reach)[0];
         positions[k] = (rounds[k]->place.point - middle).cast<float>();
     });
-    return known_noise(middle, CloudNoise(positions, found), sides);
+    return known_noise(middle, CloudNoise(positions, found), sides, slabs);
 }
 
 } // namespace scanshade

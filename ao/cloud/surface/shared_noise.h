@@ -16,7 +16,8 @@ namespace scanshade {
 struct SharedNoise {
     Eigen::Vector3d middle = Eigen::Vector3d::Zero(); ///< that the noise's positions are relative to
     CloudNoise noise;
-    bool sides = false; ///< recorded normals tell the two sides of a board apart
+    bool sides = false;           ///< recorded normals tell the two sides of a board apart
+    bool exceeds_spacing = false; ///< as of merged depth frames; `noise` need not be known then
 };
 
 /// Where noise is looked for, whatever the memory: so many places, the points with the lowest hashes of their numbers.
