@@ -97,7 +97,8 @@ class Result:
 
     @functools.cached_property
     def info(self) -> dict[str, Any]:
-        """Settings as used, device, depth_noise, radius; and of each frame name, notes, doubts, coverage and ms."""
+        """Settings as used, device, depth_noise, radius, warnings; of each frame name, notes, warnings, doubts, coverage,
+        mean_visibility, expected_error and ms."""
         return json.loads(_c.text("result_info", self._handle.value))
 
     @property

@@ -170,7 +170,8 @@ typedef struct scanshade_arrays {
     { sizeof(scanshade_arrays), 0, 0, 0, NULL, NULL, NULL }
 
 /* Ambient occlusion of depth images, each by itself; with the setting `sequence` and poses, together. The noise of the
- * depth is measured on up to five of the images unless the setting `depth-noise` says it. BAD_INPUT names the image. */
+ * depth is measured on up to five of the images unless the setting `depth-noise` says it. Without the setting `radius`,
+ * a scene too small for the usual one gets a smaller one. BAD_INPUT names the image. */
 SCANSHADE_API scanshade_status scanshade_compute_depth(scanshade_session* session, const scanshade_depth* depth,
                                                        uint32_t outputs, scanshade_result** result);
 /* Of every point, by rays from it, without a camera. `sky` and `radius` of clouds are the settings cloud.sky and
@@ -179,8 +180,9 @@ SCANSHADE_API scanshade_status scanshade_compute_points(scanshade_session* sessi
                                                         uint32_t outputs, scanshade_result** result);
 
 SCANSHADE_API scanshade_status scanshade_result_arrays(const scanshade_result* result, scanshade_arrays* arrays);
-/* A JSON object: "settings" as used, "device", "depth_noise", "radius", and "frames", a list with "name", "notes",
- * "doubts" (why the values may be wrong), "coverage" and "ms" for each image. */
+/* A JSON object: "settings" as used, "device", "depth_noise", "radius" (that of small scenes is smaller than the
+ * setting), "warnings" about all images together, and "frames", a list with "name", "notes", "warnings", "doubts" (why
+ * the values may be wrong), "coverage", "mean_visibility", "expected_error" (RMS; null = unknown) and "ms" for each. */
 SCANSHADE_API const char* scanshade_result_info(const scanshade_result* result);
 /* The doubt of that number about image `image`; NULL past the last. */
 SCANSHADE_API const char* scanshade_result_doubt(const scanshade_result* result, int64_t image, int64_t number);
