@@ -1,8 +1,8 @@
 #include "apps/budget/trial.h"
 
 #include "ao/gpu/device.h"
-#include "apps/frame/first_look.h"
 #include "apps/compare/map_set.h"
+#include "apps/frame/first_look.h"
 #include "io/images/image_file.h"
 #include "projection/attach.h"
 #include "projection/base/error.h"

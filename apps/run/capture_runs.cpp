@@ -1,8 +1,8 @@
 #include "apps/run/capture_runs.h"
 
-#include "apps/frame/sequence_steps.h"
 #include "apps/budget/front.h"
 #include "apps/doubts/pose_check.h"
+#include "apps/frame/sequence_steps.h"
 #include "apps/page/run_page.h"
 #include "apps/results/mcap_recording.h"
 #include "apps/run/interruption.h"

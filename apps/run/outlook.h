@@ -1,8 +1,8 @@
 // The last messages of a run: the expected error of its results, and the cost of a better preset.
 #pragma once
 
-#include "apps/frame/frame_row.h"
 #include "apps/budget/front.h"
+#include "apps/frame/frame_row.h"
 #include "apps/session/settings.h"
 
 #include <string>

@@ -355,7 +355,8 @@ std::vector<Stage> RunSettings::common_stages() {
           {.name = "light",
            .help =
                "direct light in the colours, for --shade ambient and --write light: auto, none = all light is ambient; "
-               "X,Y,Z = towards it, as long as it is stronger than ambient light, in the recording's world where frames "
+               "X,Y,Z = towards it, as long as it is stronger than ambient light, in the recording's world where "
+               "frames "
                "have poses, else in camera space (x right, y down, z forward)",
            .value = &s.light,
            .affects = Affects::outputs},

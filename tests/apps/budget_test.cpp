@@ -1,7 +1,7 @@
 // The Pareto front of measured configurations, and what a budget of run picks from it by class of sensor.
 #include "apps/budget/budget.h"
-#include "apps/budget/front.h"
 #include "apps/budget/configurations.h"
+#include "apps/budget/front.h"
 #include "apps/session/presets.h"
 #include "tests/support/measured.h"
 #include "tests/support/says.h"
