@@ -1,4 +1,5 @@
 // Pictures of clouds show the cloud: filled, tight, whatever strays, colours of zero and the side that normals face.
+#include "apps/picture.h"
 #include "apps/results/cloud_picture.h"
 
 #include <cmath>
