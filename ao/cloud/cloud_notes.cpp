@@ -16,9 +16,9 @@ std::optional<std::string> told_noise(const FittedCounts& fitted) {
 std::string told_sides(const SettledSides& sides, bool recorded) {
     const std::string facing = sides.orientation.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
     if (recorded && sides.turned_points > 0)
-        return fmt::format("normals: recorded; {:.2g} % of them were turned, since {}; {}{}.",
+        return fmt::format("normals: recorded; {:.2g} % of them were turned, since {}{}.",
                            100.0 * static_cast<double>(sides.turned_points) / static_cast<double>(sides.judged_points),
-                           sides.turned_why, facing, sides.orientation.why);
+                           sides.turned_why, sides.repaired ? "" : "; " + facing + sides.orientation.why);
     return recorded ? "normals: recorded."
                     : "normals: from planes through 16 neighbours, " + facing + sides.orientation.why + ".";
 }

@@ -111,7 +111,8 @@ void SettledSides::decide_by_scanner(const CloudSurface& surface, Sides& found) 
             sign = static_cast<std::int8_t>(-sign);
 }
 
-std::optional<std::string> SettledSides::objection(const CloudSurface& surface, std::optional<DiscRays>& rays) const {
+std::optional<std::string> SettledSides::objection(const CloudSurface& surface, std::optional<DiscRays>& rays,
+                                                   bool in_order) const {
     const bool viewed = orientation.kind == NormalOrientation::Kind::viewpoint;
     const Patches patches = patches_of(surface);
     const auto objects = [&](const SidesEffort& effort) {
@@ -127,7 +128,7 @@ std::optional<std::string> SettledSides::objection(const CloudSurface& surface, 
     if (z_up_)
         return "most of the recorded normals look down, though the cloud seems to be seen from above; they are kept: "
                "--cloud.outside up turns them, --cloud.normals recorded is sure of them.";
-    if (orientation.kind == NormalOrientation::Kind::terrain) // z may point anywhere
+    if (orientation.kind == NormalOrientation::Kind::terrain && in_order) // z may point anywhere
         return std::nullopt;
     return fmt::format("nearly all recorded normals face away from {}; they are kept: --cloud.outside turns them, "
                        "--cloud.normals recorded is sure of them.",
@@ -145,7 +146,7 @@ void SettledSides::object_early(const LocalCloud& points, std::span<const Vector
     early_ = std::async(std::launch::async, [this, part = std::move(part)] {
         const CloudSurface surface = part.surface();
         std::optional<DiscRays> rays;
-        return objection(surface, rays);
+        return objection(surface, rays, true);
     });
 }
 
@@ -175,23 +176,24 @@ std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::opt
     constexpr double contradictory = 0.005;
     recorded_kept = contradiction(surface) < contradictory;
     if (!recorded_kept) {
-        RepairedSides repaired = repaired_sides(surface);
+        RepairedSides repair = repaired_sides(surface);
         Sides found;
-        if (repaired.undecided > 0) {
+        if (repair.undecided > 0) {
             found = found_in(surface, patches_of(surface), rays);
             decide_by_scanner(surface, found);
         }
-        if (constexpr double mostly = 0.5; repaired.undecided > mostly) {
+        if (constexpr double mostly = 0.5; repair.undecided > mostly) {
             turn(surface, found.sign, "their sides look random");
             note(found);
             return std::move(found.confidence);
         }
         // Parts without a smooth pair to others keep what was recorded, which was wrong as often as elsewhere.
-        known.assign(surface.size(), static_cast<float>(1 - 2 * repaired.turned));
+        known.assign(surface.size(), static_cast<float>(1 - 2 * repair.turned));
         for (std::size_t i = 0; i < surface.size(); ++i)
-            if (repaired.sign[i] == 0)
-                repaired.sign[i] = found.sign[i], known[i] = found.confidence[i];
-        turn(surface, repaired.sign, "they opposed most of their neighbours");
+            if (repair.sign[i] == 0)
+                repair.sign[i] = found.sign[i], known[i] = found.confidence[i];
+        turn(surface, repair.sign, "they opposed most of their neighbours");
+        repaired = true;
     }
     if (orientation.kind == NormalOrientation::Kind::viewpoint && !orientation.point.isZero()) {
         // All is seen from the recorded position, unless it is another's, as in merged scans. Free space tells.
@@ -201,7 +203,7 @@ std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::opt
             if (!rays)
                 rays.emplace(surface);
             if (opposed_share(surface, sides_of(surface, patches_of(surface), &*rays, {})) > hardly_opposed) {
-                recorded_kept = false;
+                recorded_kept = repaired = false;
                 turn(surface, seen.sign, fmt::format("{:.0f} % of them faced away from the scanner", 100 * opposed));
                 doubts.push_back(fmt::format("{:.0f} % of the recorded normals face away from {}; they were turned: "
                                              "--cloud.normals recorded keeps them.",
@@ -215,9 +217,9 @@ std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::opt
                                       return Vector3d(surface.normals[i].cast<double>());
                                   }).surface();
         std::optional<DiscRays> rays_of_some;
-        return objection(some, rays_of_some);
+        return objection(some, rays_of_some, recorded_kept);
     };
-    const std::optional<std::string> doubt = !asks_part(surface.size())        ? objection(surface, rays)
+    const std::optional<std::string> doubt = !asks_part(surface.size())        ? objection(surface, rays, recorded_kept)
                                              : early_.valid() && recorded_kept ? early_.get()
                                                                                : of_part();
     if (doubt)

@@ -26,6 +26,7 @@ class SettledSides {
     std::size_t judged_points = 0;            ///< of the surfaces where some were
     std::string turned_why;
     bool recorded_kept = false; ///< all of them
+    bool repaired = false;      ///< some were turned to agree with their neighbours, whatever `orientation` is
 
     /// Begins to look for what objects to recorded sides, by a part of the points, beside other work. `normals`: the
     /// recorded ones of these points.
@@ -39,10 +40,10 @@ class SettledSides {
   private:
     [[nodiscard]] Sides found_in(const CloudSurface& surface, const Patches& patches, std::optional<DiscRays>& rays,
                                  const SidesEffort& effort = {}) const;
-    /// A sentence where nearly all recorded sides face away from where scanners could have stood. `rays` as for
-    /// settle().
-    [[nodiscard]] std::optional<std::string> objection(const CloudSurface& surface,
-                                                       std::optional<DiscRays>& rays) const;
+    /// A sentence where nearly all recorded sides face away from where scanners could have stood. `in_order`: they did
+    /// not contradict each other. `rays` as for settle().
+    [[nodiscard]] std::optional<std::string> objection(const CloudSurface& surface, std::optional<DiscRays>& rays,
+                                                       bool in_order) const;
     /// Of clouds of so many points, only a part is asked.
     [[nodiscard]] bool asks_part(std::size_t points) const;
     /// Where both sides would do, that to the scanner is right.

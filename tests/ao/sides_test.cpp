@@ -389,5 +389,37 @@ TEST(Sides, a_ball_whose_normals_look_in_is_doubted) {
     EXPECT_NE(doubts_of_sides(visibility(ball, inward)), "");
 }
 
+/// Where z may point anywhere, normals that look away from it are no mistake, unless they also contradict each other.
+TEST(Sides, a_scan_whose_normals_look_away_and_contradict_each_other_is_doubted) {
+    Points points, outward; // hills on a whole floor: nobody sees them from beneath
+    Dice places(3);
+    for (int i = 0; i < 40000; ++i) {
+        points.emplace_back(2 * places.roll(), 2 * places.roll(), 0);
+        outward.emplace_back(0, 0, 1);
+    }
+    for (const Vector3d& middle : {Vector3d(0.5, 0.6, 0), Vector3d(1.4, 0.5, 0), Vector3d(1, 1.5, 0)})
+        for (const Vector3d& point : sphere(2600, Vector3d::Zero()))
+            if (point.z() > 0) {
+                points.push_back(middle + 0.15 * point.normalized());
+                outward.push_back(point.normalized());
+            }
+    const auto with = [&](double side, double flipped) {
+        Dice dice(5);
+        Points normals;
+        for (const Vector3d& out : outward)
+            normals.push_back(dice.roll() < flipped ? Vector3d(-side * out) : Vector3d(side * out));
+        return visibility(points, normals, {.radius = 0.2});
+    };
+    EXPECT_EQ(doubts_of_sides(with(1, 0)), "");
+    const PointVisibility repaired = with(1, 0.05);
+    EXPECT_EQ(doubts_of_sides(repaired), "");
+    EXPECT_LT(wrong_sides(repaired, outward).all, 0.001);
+    EXPECT_NE(tests::joined(repaired.notes).find("since they opposed most of their neighbours."), std::string::npos)
+        << "which says nothing of where the whole looks: " << tests::joined(repaired.notes);
+    EXPECT_EQ(doubts_of_sides(with(-1, 0)), "");
+    const PointVisibility doubted = with(-1, 0.05);
+    EXPECT_NE(doubts_of_sides(doubted).find("face away"), std::string::npos) << tests::joined(visibility(points).notes);
+}
+
 } // namespace
 } // namespace scanshade
