@@ -305,7 +305,7 @@ class DepthFrames {
         std::vector<std::size_t> all(listing_.entries.size());
         std::iota(all.begin(), all.end(), std::size_t{0});
         std::vector<DepthImage> images;
-        if (asked.depth_noise == "auto" || !asked.gives_radius())
+        if (needs_look(asked))
             for (const std::size_t index : spread(5, all.size()))
                 images.push_back(project(frame(index)));
         return {look_at(images, asked),

@@ -50,6 +50,8 @@ bool measures_noise(const RunSettings& asked) { return asked.depth_noise == "aut
 
 } // namespace
 
+bool needs_look(const RunSettings& asked) { return measures_noise(asked) || !asked.gives_radius(); }
+
 CaptureLook look_at(std::span<const DepthImage> seen, const RunSettings& asked) {
     CaptureLook look;
     look.noise = measures_noise(asked) ? measure_noise(seen) : noise_from_text(asked.depth_noise);
@@ -60,8 +62,8 @@ CaptureLook look_at(std::span<const DepthImage> seen, const RunSettings& asked) 
 CaptureLook look_at(const Capture& capture, const std::vector<std::size_t>& frames, const RunSettings& asked,
                     LoadedFrames& loaded, bool with_colour) {
     const bool images = std::ranges::all_of(capture.entries, [](const auto& entry) { return entry.cloud.empty(); });
-    if (!measures_noise(asked) && (!images || asked.gives_radius()))
-        return {.noise = noise_from_text(asked.depth_noise)};
+    if (!needs_look(asked) || (!measures_noise(asked) && !images))
+        return look_at({}, asked);
     const bool by_points = asked.clouds != CloudWalk::view && !capture.camera;
     const std::vector<DepthImage> seen =
         first_look(capture, frames, &loaded, with_colour,

@@ -23,7 +23,9 @@ struct CaptureLook {
 /// were decoded, with their colour if `with_colour`.
 [[nodiscard]] CaptureLook look_at(const Capture& capture, const std::vector<std::size_t>& frames,
                                   const RunSettings& asked, LoadedFrames& loaded, bool with_colour = false);
-/// The same of depth images in memory, some of a recording's.
+/// Whether depth images have to be looked at: the settings leave their noise or the radius open.
+[[nodiscard]] bool needs_look(const RunSettings& asked);
+/// The same as look_at() of depth images in memory, some of a recording's; none where none has to be looked at.
 [[nodiscard]] CaptureLook look_at(std::span<const DepthImage> seen, const RunSettings& asked);
 
 /// How the capture's clouds are computed: as asked, but from their points by methods that need no view, and as views
