@@ -399,9 +399,8 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
     }
     require_results();
     const CloudErrorTables& errors = shipped_cloud_errors();
-    // Tables were fitted to less noise. Found / expected errors of merged depth frames of kitchen and attic were 1.3
-    // .. 2.2.
-    const float of_slabs = fitted.largest_disc.empty() ? 1.0F : 1.6F;
+    constexpr float beyond_tables = 1.6F; // fitted to less noise: of kitchen and attic found / expected was 1.3 .. 2.2
+    const float of_slabs = fitted.largest_disc.empty() ? 1.0F : beyond_tables;
     const auto give = [&](std::size_t index, std::size_t point) {
         result_.visibility[point] = values[index];
         result_.normals[point] = surface.normals[index];

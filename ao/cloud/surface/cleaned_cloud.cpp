@@ -119,7 +119,7 @@ class Windows {
         : points_(points), facing_(facing), widest_(widest) {}
 
     /// The first of growing balls that holds a slab.
-    [[nodiscard]] WindowPlane round(std::size_t index) {
+    [[nodiscard]] WindowPlane around(std::size_t index) {
         constexpr std::size_t first = 32;
         const Vector3f facing = facing_.of(index);
         Nearest nearest;
@@ -264,7 +264,7 @@ std::vector<Vector3f> positions_of(std::span<const WindowPlane> planes) {
     return all;
 }
 
-/// Planes, each with the noise that is usual round it.
+/// Planes, each with the noise that is usual around it.
 struct Seeds {
     std::vector<WindowPlane> planes; ///< good ones: they hold no relief
     std::vector<float> sigma;
@@ -320,7 +320,7 @@ class Cleaning {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, seeds.size(), 64), [&](const auto& range) {
             Windows windows(pyramid, facing_, 0.7F * radius_);
             for (std::size_t k = range.begin(); k < range.end(); ++k)
-                planes[k] = windows.round(seeds[k]);
+                planes[k] = windows.around(seeds[k]);
         });
         std::erase_if(planes, [](const WindowPlane& plane) { return !(plane.radius > 0); });
         return planes;
@@ -469,7 +469,7 @@ class Cleaning {
         return NeighbourTree(positions);
     }
 
-    /// Onto the surface of the discs round each: the median of their offsets, then Tukey's mean of 4 and of 2 sigma.
+    /// Onto the surface of the discs around each: the median of their offsets, then Tukey's mean of 4 and of 2 sigma.
     void project() {
         const NeighbourTree tree = tree_of_discs();
         std::vector<Vector3f> projected(discs_.size());
@@ -590,13 +590,13 @@ class Cleaning {
 
 } // namespace
 
-std::vector<std::optional<Slab>> slabs_round(const NeighbourTree& tree, std::span<const Vector3d> normals,
-                                             std::span<const std::size_t> indices, float widest) {
+std::vector<std::optional<Slab>> slabs_around(const NeighbourTree& tree, std::span<const Vector3d> normals,
+                                              std::span<const std::size_t> indices, float widest) {
     const Pyramid pyramid(tree, {});
     const PointNormals facing = facing_of(tree, normals, true);
     std::vector<std::optional<Slab>> slabs(indices.size());
     tbb::parallel_for(std::size_t(0), slabs.size(), [&](std::size_t k) {
-        if (const WindowPlane plane = Windows(pyramid, facing, widest).round(indices[k]); plane.radius > 0)
+        if (const WindowPlane plane = Windows(pyramid, facing, widest).around(indices[k]); plane.radius > 0)
             slabs[k] = {plane.scatter, plane.spacing};
     });
     return slabs;

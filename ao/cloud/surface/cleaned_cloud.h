@@ -9,7 +9,7 @@
 
 namespace scanshade {
 
-/// What the ball round a point tells of a slab of noise.
+/// The slab of noise in the ball around a point.
 struct Slab {
     float sigma = 0;   ///< across the surface, in the tree's unit
     float spacing = 0; ///< of the points if they lay on the surface: the side of a square that holds one
@@ -17,15 +17,15 @@ struct Slab {
 /// Of points of the tree: the first of growing balls whose radius is five sigma of its points or more. Nothing where
 /// none up to `widest` is. `normals` is empty or holds one per point of the cloud: points that face away are another
 /// surface then.
-[[nodiscard]] std::vector<std::optional<Slab>> slabs_round(const NeighbourTree& tree,
-                                                           std::span<const Eigen::Vector3d> normals,
-                                                           std::span<const std::size_t> indices, float widest);
+[[nodiscard]] std::vector<std::optional<Slab>> slabs_around(const NeighbourTree& tree,
+                                                            std::span<const Eigen::Vector3d> normals,
+                                                            std::span<const std::size_t> indices, float widest);
 /// Whether noise is larger than the spacing at enough of the places.
 [[nodiscard]] bool noise_exceeds_spacing(std::span<const std::optional<Slab>> slabs);
 
 /// Discs on the surface that the points scatter about; each stands for the points that were moved to it.
 ///
-/// 1. Robust planes of seeds, one per voxel: the first of growing balls whose radius is five sigma tells sigma there.
+/// 1. Robust planes of seeds, one per voxel: sigma there is that of the first growing ball whose radius is five sigma.
 /// 2. Every point chooses the plane, among those of its nearest seeds, that explains it best. So edges stay sharp: this
 ///    is the best of shifted windows, not their mean. It moves onto the mean of those that agree with the chosen one.
 /// 3. Moved points are taken together in voxels as large as the noise, and these discs are projected onto each other

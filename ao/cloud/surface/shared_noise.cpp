@@ -58,7 +58,7 @@ std::optional<SharedNoise> noise_at(std::span<const NoisePlace> places, const Lo
     const bool sides = !normals.empty() && sides_agree(opposed);
     const std::span<const Vector3d> facing = sides ? normals : std::span<const Vector3d>();
     return known_noise(cloud.middle, CloudNoise(cloud.tree, look, facing, indices), sides,
-                       slabs_round(cloud.tree, facing, indices, look.reach));
+                       slabs_around(cloud.tree, facing, indices, look.reach));
 }
 
 NoisePlaces::NoisePlaces(std::span<const NoisePlace> places, const NoiseLook& look) : look_(look) {
@@ -155,7 +155,7 @@ std::optional<SharedNoise> NoisePlaces::measured() const {
     each([&](std::size_t k, const NeighbourTree& tree, const std::vector<Vector3d>& normals, std::size_t own) {
         const std::span<const Vector3d> facing = sides ? normals : std::span<const Vector3d>();
         found[k] = noise_round(tree, facing, own, look_);
-        slabs[k] = slabs_round(tree, facing, std::array{own}, look_.reach)[0];
+        slabs[k] = slabs_around(tree, facing, std::array{own}, look_.reach)[0];
         positions[k] = (rounds[k]->place.point - middle).cast<float>();
     });
     return known_noise(middle, CloudNoise(positions, found), sides, slabs);
