@@ -239,7 +239,7 @@ TEST(Sides, right_normals_of_merged_depth_frames_are_kept) {
         const Eigen::Isometry3d pose = scene::world_from_camera(world.scene().walk, frame);
         for (int v = 0; v < height; ++v)
             for (int u = 0; u < width; ++u) {
-                const Vector3d ray = pose.linear() * Vector3d(u - width / 2, v - height / 2, focal_px).normalized();
+                const Vector3d ray = pose.linear() * Vector3d(u - 0.5 * width, v - 0.5 * height, focal_px).normalized();
                 if (const scene::Hit hit = world.cast({pose.translation(), ray}); hit.body) {
                     points.push_back(pose.translation() + hit.t * ray);
                     normals.push_back(hit.normal);
