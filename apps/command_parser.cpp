@@ -18,8 +18,8 @@ namespace {
 /// Flags from the command line and the settings file, as they are read.
 using Given = std::vector<std::pair<Parameter, std::string>>;
 
-/// A switch is given as --name or --name=false; everything else takes a value. --settings FILE gives others theirs,
-/// unless the command line gives them itself.
+/// A switch stands alone or takes a word that joined() put behind a '='; everything else takes a value. --settings FILE
+/// gives others theirs, unless the command line gives them itself.
 void add_flag(CLI::App& parser, const Parameter& row, Given& given) {
     const std::string names = flag_names(row);
     const auto take = [&given, row](const std::string& text) { given.emplace_back(row, text); };
@@ -29,6 +29,24 @@ void add_flag(CLI::App& parser, const Parameter& row, Given& given) {
         parser.add_flag(names)->each(take);
     else
         parser.add_option_function<std::string>(names, take);
+}
+
+/// The arguments, with "--overwrite no" as "--overwrite=no": a switch takes a next word of these four and no other,
+/// which may be a path.
+std::vector<std::string> joined(const std::vector<std::string>& arguments, const std::vector<Parameter>& rows) {
+    const auto is_the_switch = [&](const std::string& word) {
+        return std::ranges::any_of(rows, [&](const Parameter& row) {
+            return is_switch(row) && (word == flag_of(row) || flag_names(row) == word + "," + flag_of(row));
+        });
+    };
+    std::vector<std::string> words;
+    for (const std::string& argument : arguments)
+        if (!words.empty() && is_the_switch(words.back()) &&
+            (argument == "yes" || argument == "no" || argument == "true" || argument == "false"))
+            words.back() += "=" + argument;
+        else
+            words.push_back(argument);
+    return words;
 }
 
 std::vector<std::string> flags_of(const std::vector<Parameter>& rows) {
@@ -43,6 +61,19 @@ void refuse_unknown_flag(const std::vector<std::string>& unknown, const std::vec
     for (const std::string& word : unknown)
         if (const std::string flag = word.substr(0, word.find('=')); flag.starts_with('-'))
             throw Misuse(fmt::format("{}: no such flag{}", flag, suggestion(flag, flags_of(rows))));
+}
+
+/// CLI11's message about a count begins with the name of what was counted.
+[[noreturn]] void refuse_count(const std::string& message, const std::vector<std::string>& arguments,
+                               const std::vector<Parameter>& rows, const Words& words) {
+    const std::string name = message.substr(0, message.find(':'));
+    if (name == words.name)
+        throw Misuse(fmt::format("{} {} expected at most, more are given", words.at_most, name));
+    const auto row = std::ranges::find_if(rows, [&](const Parameter& each) { return flag_of(each) == name; });
+    const std::string range = row == rows.end() ? "" : range_text(*row);
+    if (!arguments.empty() && arguments.back().starts_with('-') && arguments.back().find('=') == std::string::npos)
+        throw Misuse(fmt::format("{} needs a value{}{}", name, range.empty() ? "" : ": ", range));
+    throw Misuse(fmt::format("{} is given more than once", name));
 }
 
 /// CLI11's message about a settings file ends with the setting that it did not know.
@@ -69,14 +100,23 @@ void parse(Command& command, std::vector<std::string> arguments) {
         rows.insert(rows.end(), stage.rows.begin(), stage.rows.end());
     for (const Parameter& row : rows)
         add_flag(parser, row, given);
-    std::ranges::reverse(arguments); // as CLI11 takes a vector
+    arguments = joined(arguments, rows);
     try {
-        parser.parse(arguments);
+        parser.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend())); // as CLI11 takes a vector
     } catch (const CLI::ConfigError& error) {
         refuse_unknown_setting(error.what(), rows);
-    } catch (const CLI::ParseError& error) {
+    } catch (const CLI::FileError&) {
+        throw Misuse("settings: the file is missing or cannot be read");
+    } catch (const CLI::RequiredError&) {
         refuse_unknown_flag(parser.remaining(), rows);
-        throw Misuse(error.what());
+        throw Misuse(fmt::format("{} is missing: {}", words.name, words.help));
+    } catch (const CLI::ArgumentMismatch& error) {
+        refuse_unknown_flag(parser.remaining(), rows);
+        refuse_count(error.what(), arguments, rows, words);
+    } catch (const CLI::ParseError&) {
+        refuse_unknown_flag(parser.remaining(), rows);
+        throw Misuse(parser.remaining().empty() ? "flags and words in an order that makes no sense"
+                                                : fmt::format("'{}' is one word too many", parser.remaining().front()));
     }
     const auto take = [](const auto& each) { set(each.first, each.second); };
     const auto rest = std::stable_partition(given.begin(), given.end(),

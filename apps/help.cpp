@@ -34,7 +34,7 @@ constexpr const char* program_summary = "ambient occlusion for recorded depth im
 std::string limits(const Parameter& row) {
     const std::string value = value_text(row), range = range_text(row);
     const std::string otherwise = value.empty() ? "" : "default " + value;
-    const std::string allowed = is_switch(row) ? "" : range;
+    const std::string allowed = is_switch(row) && value == "false" ? "" : range;
     if (otherwise.empty() && allowed.empty())
         return "";
     return fmt::format(" [{}{}{}]", otherwise, otherwise.empty() || allowed.empty() ? "" : "; ", allowed);

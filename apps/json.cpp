@@ -1,6 +1,8 @@
 // Values that both the manifest and `inspect --json` contain.
 #include "apps/json.h"
 
+#include "io/shallow_json.h"
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -72,7 +74,7 @@ void rethrow_as_error() {
     try {
         throw;
     } catch (const json::exception& failure) {
-        throw Error(failure.what());
+        throw Error(json_problem(failure.id, failure.what()));
     }
 }
 

@@ -1,9 +1,10 @@
 #include "apps/settings_file.h"
 
-#include "io/shallow_json.h"
+#include "io/captures/listing/layouts.h"
 #include "projection/base/error.h"
 
 #include <fmt/format.h>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 namespace scanshade {
@@ -20,11 +21,9 @@ std::string typed(const std::string& name, const json& value) {
 
 json parsed(std::istream& stream) {
     try {
-        return shallow_json<json>(stream);
+        return parsed_json({std::istreambuf_iterator<char>(stream), {}}, "settings");
     } catch (const Error& failure) {
-        throw Misuse(fmt::format("settings: {}", failure.what()));
-    } catch (const json::exception& failure) {
-        throw Misuse(fmt::format("settings: {}", failure.what()));
+        throw Misuse(failure.what());
     }
 }
 

@@ -4,11 +4,16 @@
 #include "projection/base/error.h"
 
 #include <fmt/format.h>
+#include <string>
+#include <string_view>
 #include <utility>
 
 namespace scanshade {
 
 inline constexpr int deepest_json = 64;
+
+/// What was wrong, for people: the JSON library's number of its exception and its text -> a sentence of ours.
+[[nodiscard]] std::string json_problem(int id, std::string_view text);
 
 /// Json::parse(text), `text` being a string or a stream. Throws what it throws, and Error where values nest deeper than
 /// deepest_json.

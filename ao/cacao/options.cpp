@@ -15,7 +15,7 @@ constexpr std::array storage_words{Named{"auto", MaybeStorage()}, Named{"buffers
 
 } // namespace
 
-std::vector<Parameter> CacaoOptions::parameters() {
+std::vector<Parameter> CacaoOptions::parameters() { // NOLINT(readability-function-size): a table
     return {
         {.name = "profile",
          .help = "reference reproduces AMD's shaders; scan corrects them for sensor depth",

@@ -243,6 +243,11 @@ ThinnedCheck CloudWork::check_of_whole() const {
 
 bool CloudWork::is_checked() const { return check_of_whole().keep > 0; }
 
+/// How far rays go; in a sky at any distance.
+float CloudWork::reach() const {
+    return options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
+}
+
 /// Again with a part of the points: where that gives other values, these are not to be relied on.
 void CloudWork::compute_thinned() {
     const ThinnedCheck check = check_of_whole();
@@ -352,24 +357,41 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
     for (const std::uint32_t index : lonely)
         surface.normals[index].setZero();
     watch_.lap("sides");
-    // Both orders are ascending. A point of the surface is wanted if it stands for one of the core.
-    std::vector<char> in_core(core.size() == round.size() ? 0 : round.size(), 0), wanted;
+    const Wanted wanted = wanted_of(core, round, fitted);
+    const Untouched<float> values = visibility_of(surface, std::move(rays), wanted, gpu);
+    attach(planes, values, side_known, round, wanted);
+    if (!part_ && fitted.empty()) {
+        order_.resize(round.size());
+        tbb::parallel_for(std::size_t(0), order_.size(),
+                          [&](std::size_t i) { order_[i] = round[surface.tree.original(i)]; });
+    }
+    watch_.lap("gather");
+}
+
+/// Both orders are ascending. A point of the surface is wanted if it stands for one of the core.
+CloudWork::Wanted CloudWork::wanted_of(const Indices& core, const Indices& round, const FittedCloud& fitted) {
+    Wanted wanted;
+    std::vector<char>& in_core = wanted.in_core;
+    in_core.resize(core.size() == round.size() ? 0 : round.size(), 0);
     for (std::size_t k = 0, c = 0; k < in_core.size() && c < core.size(); ++k)
         if (round[k] == core[c]) {
             in_core[k] = 1;
             ++c;
         }
     if (!in_core.empty() && !fitted.empty()) {
-        wanted.resize(fitted.points.size(), 0);
+        wanted.fitted.resize(fitted.points.size(), 0);
         for (std::size_t k = 0; k < round.size(); ++k)
-            wanted[fitted.fitted_of[k]] |= in_core[k];
+            wanted.fitted[fitted.fitted_of[k]] |= in_core[k];
     } else {
-        wanted = in_core;
+        wanted.fitted = in_core;
     }
-    const auto is_wanted = [&, &tree = surface.tree](std::size_t index) {
-        return wanted.empty() || wanted[tree.original(index)];
-    };
-    const float radius = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
+    return wanted;
+}
+
+/// Rays from the points that are wanted and from those that their means need, then the means.
+Untouched<float> CloudWork::visibility_of(const CloudSurface& surface, std::optional<DiscRays> rays,
+                                          const Wanted& wanted, CloudGpu* gpu) {
+    const float radius = reach();
     const std::optional<Vector3f> up = options_.sky ? std::optional<Vector3f>(setup_.up.cast<float>()) : std::nullopt;
     Untouched<float> values;
     if (gpu) {
@@ -383,8 +405,8 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
         values.resize(surface.size());
         tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t i) { values[i] = nothing; });
         std::vector<char> asked(surface.size(), 1);
-        if (!wanted.empty()) {
-            tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) { asked[i] = is_wanted(i); });
+        if (!wanted.fitted.empty()) {
+            tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) { asked[i] = wanted.has(surface, i); });
             asked = asked_by_means(surface, std::move(asked), passes_);
         }
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.tree.leaves(), 8), [&](const auto& range) {
@@ -397,6 +419,15 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
             values = smoothed(surface, values, radius);
         watch_.lap("means");
     }
+    return values;
+}
+
+/// Visibility, error and normal of each of the surface's points -> those points of the cloud that it stands for.
+void CloudWork::attach(const Fitted& planes, const Untouched<float>& values, const std::vector<float>& side_known,
+                       const Indices& round, const Wanted& wanted) {
+    const CloudSurface& surface = planes.surface;
+    const FittedCloud& fitted = planes.points;
+    const float radius = reach();
     require_results();
     const CloudErrorTables& errors = shipped_cloud_errors();
     constexpr float beyond_tables = 1.6F; // fitted to less noise: of kitchen and attic found / expected was 1.3 .. 2.2
@@ -423,7 +454,7 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
     };
     if (fitted.empty()) {
         tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
-            if (is_wanted(i) && !std::isnan(values[i]))
+            if (wanted.has(surface, i) && !std::isnan(values[i]))
                 give(i, round[surface.tree.original(i)]);
         });
     } else {
@@ -432,16 +463,10 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
             index_of[surface.tree.original(i)] = static_cast<std::uint32_t>(i);
         tbb::parallel_for(std::size_t(0), round.size(), [&](std::size_t k) {
             const std::size_t index = index_of[fitted.fitted_of[k]];
-            if ((in_core.empty() || in_core[k]) && !std::isnan(values[index]))
+            if ((wanted.in_core.empty() || wanted.in_core[k]) && !std::isnan(values[index]))
                 give(index, round[k]);
         });
     }
-    if (!part_ && fitted.empty()) {
-        order_.resize(round.size());
-        tbb::parallel_for(std::size_t(0), order_.size(),
-                          [&](std::size_t i) { order_[i] = round[surface.tree.original(i)]; });
-    }
-    watch_.lap("gather");
 }
 
 /// Turns normals like those of the whole's nearest point in the same plane. Returns how sure that is by index in

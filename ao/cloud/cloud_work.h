@@ -118,6 +118,15 @@ class CloudWork {
         FittedCloud points; ///< empty where the surface's points are those of the cloud
     };
 
+    /// Of a tile, what values are needed for; empty = all of it.
+    struct Wanted {
+        std::vector<char> in_core; ///< by place in the tile
+        std::vector<char> fitted;  ///< by place among the surface's points before they were put in order
+        [[nodiscard]] bool has(const CloudSurface& surface, std::size_t index) const {
+            return fitted.empty() || fitted[surface.tree.original(index)];
+        }
+    };
+
     void require_results();
     void settle_orientation(const std::vector<Eigen::Vector3d>& some);
     void settle_extent(std::vector<Eigen::Vector3d>& some);
@@ -135,6 +144,12 @@ class CloudWork {
     void settle_rays();
     void tile(const Indices& core, const Indices& round);
     void tile(const Indices& core, const Indices& round, CloudGpu* gpu);
+    [[nodiscard]] static Wanted wanted_of(const Indices& core, const Indices& round, const FittedCloud& fitted);
+    [[nodiscard]] float reach() const;
+    [[nodiscard]] Untouched<float> visibility_of(const CloudSurface& surface, std::optional<DiscRays> rays,
+                                                 const Wanted& wanted, CloudGpu* gpu);
+    void attach(const Fitted& planes, const Untouched<float>& values, const std::vector<float>& side_known,
+                const Indices& round, const Wanted& wanted);
     [[nodiscard]] std::vector<float> sides_as_in_whole(CloudSurface& surface) const;
     void doubt_lines(const CloudSurface& surface);
     void doubt(const std::string& sentence);

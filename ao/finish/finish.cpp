@@ -156,20 +156,13 @@ Finish::Shape Finish::shape_of(const FinishInput& input, const FinishOutputs& ou
     return shape;
 }
 
-gpu::Program& Finish::program_for(const Shape& shape) {
-    constexpr std::size_t most_kept = 3; // a frame has two at most: its errors in the view, its picture as recorded
-    const auto known = std::ranges::find(programs_, shape, &decltype(programs_)::value_type::first);
-    if (known != programs_.end())
-        return *known->second;
-    if (programs_.size() == most_kept)
-        programs_.erase(programs_.begin());
+/// In the order of the names of buffers. What these outputs do not need has one texel.
+std::vector<gpu::BufferRow> Finish::buffers_of(const Shape& shape) {
     using Host = gpu::BufferRow::Host;
     constexpr auto floats = gpu::BufferRow::Texels::r32f, words = gpu::BufferRow::Texels::r32ui;
     const auto pixels = static_cast<std::size_t>(shape.size.area()), packs = words_of(shape.size);
     const FinishOutputs& outputs = shape.outputs;
-    const bool on_device = shape.on_device, packed = shape.packed(), colours = shape.colours(), clay = shape.clay();
-    const bool surfaced = shape.looks_at_surface(), linear = shape.linear();
-    // What these outputs do not need has one texel.
+    const bool on_device = shape.on_device, colours = shape.colours(), linear = shape.linear();
     const auto image = [&](std::string_view name, bool needed, Host host = Host::none) {
         return gpu::BufferRow{.name = name,
                               .bytes = needed ? pixels * 4 : 4,
@@ -192,10 +185,10 @@ gpu::Program& Finish::program_for(const Shape& shape) {
                               .plain_writes = true};
     };
     const SrgbTables& light = srgb_tables();
-    std::vector<gpu::BufferRow> buffers{
+    return {
         image("seen", true, Host::upload),
-        image("surface", surfaced, Host::upload),
-        image("visibility", packed || shape.error(), Host::upload),
+        image("surface", shape.looks_at_surface(), Host::upload),
+        image("visibility", shape.packed() || shape.error(), Host::upload),
         bytes("colour", colours ? 3 : 0, Host::upload),
         bytes("colour known", colours && shape.known ? 1 : 0, Host::upload),
         {"linear light", light.linear.size() * 4, Host::none, floats, {light.linear.begin(), light.linear.end()}},
@@ -203,7 +196,7 @@ gpu::Program& Finish::program_for(const Shape& shape) {
         image("expected error", shape.error(), outputs.error ? Host::download : Host::none),
         image("across", shape.smoothed),
         image("smooth", shape.smoothed),
-        image("cosine", clay, on_device ? Host::none : Host::download),
+        image("cosine", shape.clay(), on_device ? Host::none : Host::download),
         bytes("map", on_device ? outputs.map_bits / 8 : 0, Host::download),
         bytes("confidence map", on_device && outputs.confidence_bits > 0 ? 1 : 0, Host::download),
         bytes("picture", on_device && outputs.picture ? 3 : 0, Host::download),
@@ -221,6 +214,11 @@ gpu::Program& Finish::program_for(const Shape& shape) {
         three_floats("linear direct part", linear && outputs.split, Host::download),
         three_floats("linear indirect", linear && outputs.indirect, Host::download),
     };
+}
+
+std::vector<gpu::PassRow> Finish::passes_of(const Shape& shape) {
+    const FinishOutputs& outputs = shape.outputs;
+    const bool colours = shape.colours(), clay = shape.clay(), linear = shape.linear();
     const auto groups_of = [](std::size_t n) {
         return static_cast<std::uint32_t>((n + shared::finish_row - 1) / shared::finish_row);
     };
@@ -274,8 +272,8 @@ gpu::Program& Finish::program_for(const Shape& shape) {
                            {shared::spec_indirect, outputs.indirect},
                            {shared::spec_unbounded, outputs.light_values == LightValues::unbounded}}});
     constexpr std::uint32_t most_groups = 1 << 15;
-    const std::uint32_t groups = groups_of(packs);
-    if (packed)
+    const std::uint32_t groups = groups_of(words_of(shape.size));
+    if (shape.packed())
         passes.push_back({"pack",
                           "finish/pack",
                           {visibility, shape.error() ? error_of_each : visibility, clay ? surface : visibility,
@@ -292,8 +290,18 @@ gpu::Program& Finish::program_for(const Shape& shape) {
                            {shared::spec_unshaded, outputs.unshaded && !linear},
                            {shared::spec_split, outputs.split && !linear},
                            {shared::spec_indirect, outputs.indirect && !linear}}});
+    return passes;
+}
+
+gpu::Program& Finish::program_for(const Shape& shape) {
+    constexpr std::size_t most_kept = 3; // a frame has two at most: its errors in the view, its picture as recorded
+    const auto known = std::ranges::find(programs_, shape, &decltype(programs_)::value_type::first);
+    if (known != programs_.end())
+        return *known->second;
+    if (programs_.size() == most_kept)
+        programs_.erase(programs_.begin());
     auto program =
-        std::make_unique<gpu::Program>(device_, std::move(buffers), std::move(passes), sizeof(shared::FinishConstants));
+        std::make_unique<gpu::Program>(device_, buffers_of(shape), passes_of(shape), sizeof(shared::FinishConstants));
     return *programs_.emplace_back(shape, std::move(program)).second;
 }
 

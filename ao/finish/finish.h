@@ -119,6 +119,8 @@ class Finish {
     };
     [[nodiscard]] Shape shape_of(const FinishInput& input, const FinishOutputs& outputs) const;
     gpu::Program& program_for(const Shape& shape);
+    [[nodiscard]] static std::vector<gpu::BufferRow> buffers_of(const Shape& shape);
+    [[nodiscard]] static std::vector<gpu::PassRow> passes_of(const Shape& shape);
     static void upload(gpu::Program& program, const Shape& shape, const FinishInput& input);
 
     gpu::Device& device_;

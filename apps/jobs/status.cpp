@@ -320,9 +320,7 @@ class Merge final : public Command {
 
     std::vector<Stage> stages() override {
         return {{"output",
-                 {{.name = "page",
-                   .help = "index.html, a list of the captures, and a page for each",
-                   .value = OneOf(&page_, page_words)},
+                 {{.name = "page", .help = "index.html, a list of the captures, and a page for each", .value = &page_},
                   {.name = "strict", .help = strict_help, .value = &strict_}}}};
     }
 
@@ -374,7 +372,6 @@ class Merge final : public Command {
         write_atomically(job / "manifest.json", text_of(text) + "\n");
     }
 
-    static constexpr std::array page_words{Named{"yes", true}, Named{"no", false}};
     std::vector<std::string> job_;
     bool page_ = true, strict_ = false;
 };

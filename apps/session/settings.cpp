@@ -46,7 +46,6 @@ constexpr std::array colour_words{Named{"kept", CloudColours::kept}, Named{"shad
                                   Named{"grey", CloudColours::grey}};
 constexpr std::array shade_words{Named{"multiply", Shade::multiply}, Named{"ambient", Shade::ambient},
                                  Named{"clay", Shade::clay}};
-constexpr std::array page_words{Named{"yes", true}, Named{"no", false}};
 constexpr std::array log_words{Named{"text", false}, Named{"json", true}};
 
 /// quality_words, and none for a quality that was not given.
@@ -173,7 +172,7 @@ std::vector<Stage> RunSettings::stages_in_use(MethodSetup& setup) {
     return all;
 }
 
-std::vector<Stage> RunSettings::common_stages() {
+std::vector<Stage> RunSettings::common_stages() { // NOLINT(readability-function-size): a table
     RunSettings& s = *this;
     return {
         {"input",
@@ -389,7 +388,7 @@ std::vector<Stage> RunSettings::common_stages() {
            .affects = Affects::outputs},
           {.name = "page",
            .help = "index.html, a page to look at the results in a browser, with a small preview of each frame",
-           .value = OneOf(&s.page, page_words),
+           .value = &s.page,
            .common = true,
            .affects = Affects::outputs},
           {.name = "page-points",
@@ -499,11 +498,27 @@ void RunSettings::resolve() {
         (clouds_by_points.radius > 0 || clouds_by_points.sky || clouds_by_points.outside != usual.outside ||
          clouds_by_points.normals != usual.normals))
         clouds = CloudWalk::points;
+    refuse_settings_of_others();
     cloud_options_ = clouds_by_points;
     if (cloud_options_.radius == 0 && radius)
         cloud_options_.radius = *radius;
     (void)CloudAo(cloud_options_);
     put_common_settings();
+}
+
+void RunSettings::refuse_settings_of_others() const {
+    if (budget.any()) // picks the method later
+        return;
+    for (const auto& [name, setup] : setups_) {
+        const auto usual = method_named(name).setup();
+        if (configuration_of(preset).method == name)
+            apply(configuration_of(preset), *usual);
+        const std::vector<Parameter> defaults = usual->parameters();
+        for (const Parameter& row : setup->parameters())
+            if (name != method && value_text(row) != value_text(*row_named(defaults, row.name)))
+                throw Misuse(fmt::format("{0}.{1}: is a setting of the method {0}, and the method is {2}", name,
+                                         row.name, method));
+    }
 }
 
 void RunSettings::put_common_settings() {

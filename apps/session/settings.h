@@ -110,6 +110,7 @@ class RunSettings {
     [[nodiscard]] Stage cloud_stage();    ///< --cloud.rays and so on
     [[nodiscard]] Stage sequence_stage(); ///< --sequence.layers and so on
     [[nodiscard]] MethodSetup& setup_of(std::string_view name) const;
+    void refuse_settings_of_others() const;
     void put_common_settings();
 
     std::vector<std::pair<std::string, std::unique_ptr<MethodSetup>>> setups_;

@@ -48,10 +48,9 @@ bool mentions_not_a_number(std::string_view rest) {
     if (mentions_not_a_number(text.substr(std::min(word_start, text.size()))))
         refuse_camera(
             file, fmt::format("{}: \"{}\" holds NaN or infinity, expected a number", place, key_before(text, offset)));
-    std::string reason = failure.what();
-    if (const auto colon = reason.find(": "); colon != std::string::npos)
-        reason = reason.substr(colon + 2);
-    refuse_camera(file, fmt::format("{}: not JSON: {}", place, reason));
+    const std::string_view rest = text.substr(offset, text.find('\n', offset) - offset);
+    refuse_camera(file, rest.empty() ? fmt::format("{}: not JSON: the text ends there", place)
+                                     : fmt::format("{}: not JSON from {} on", place, in_quotes(rest)));
 }
 
 Json parse(const fs::path& file, const std::string& text) {
@@ -61,8 +60,8 @@ Json parse(const fs::path& file, const std::string& text) {
         explain_syntax(file, text, failure);
     } catch (const Error& failure) {
         refuse_camera(file, failure.what());
-    } catch (const Json::exception& failure) { // numbers beyond double
-        refuse_camera(file, fmt::format("not usable JSON: {}", failure.what()));
+    } catch (const Json::exception& failure) {
+        refuse_camera(file, json_problem(failure.id, failure.what()));
     }
 }
 

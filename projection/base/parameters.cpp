@@ -49,12 +49,8 @@ Number parsed(const Parameter& row, const std::string& text) {
 
 template <>
 bool parsed<bool>(const Parameter& row, const std::string& text) {
-    for (const char* yes : {"true", "1", "on", "yes"})
-        if (text == yes)
-            return true;
-    for (const char* no : {"false", "0", "off", "no"})
-        if (text == no)
-            return false;
+    if (const std::optional<bool> word = switch_word(text))
+        return *word;
     refuse(row, text);
 }
 
@@ -122,6 +118,13 @@ bool OneOf::set(std::string_view word) const {
     return false;
 }
 
+std::optional<bool> switch_word(std::string_view word) {
+    constexpr std::array<std::string_view, 4> yes{"yes", "true", "on", "1"}, no{"no", "false", "off", "0"};
+    if (std::ranges::count(yes, word))
+        return true;
+    return std::ranges::count(no, word) ? std::optional(false) : std::nullopt;
+}
+
 void set(const Parameter& row, const std::string& text) {
     std::visit(Overloaded{
                    [&](const OneOf& choice) {
@@ -166,7 +169,7 @@ std::vector<std::string> choices_of(const Parameter& row) {
 
 std::string range_text(const Parameter& row) {
     if (std::holds_alternative<bool*>(row.value))
-        return "true | false";
+        return "yes | no";
     if (std::holds_alternative<std::string*>(row.value) || std::holds_alternative<OneOf>(row.value))
         return choices_text(row);
     std::string limits = limits_text(row); // not const: it is moved out

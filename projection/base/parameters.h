@@ -83,6 +83,8 @@ struct Parameter {
     Affects affects = Affects::results;
 };
 
+/// yes, true, on, 1 or no, false, off, 0; none for other words.
+[[nodiscard]] std::optional<bool> switch_word(std::string_view word);
 /// Sets the row's variable from text. Throws Misuse naming the row, the text, and what was expected.
 void set(const Parameter& row, const std::string& text);
 /// Sets a row of a real number. Throws Misuse where it is out of range.

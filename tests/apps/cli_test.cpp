@@ -702,13 +702,37 @@ TEST(CliHelpTest, mistyped_words_get_the_nearest_one_as_a_hint) {
           std::pair("insepct x", "insepct: no such command; did you mean inspect?"),
           std::pair("run x -o y --method surfle", "did you mean surfel?"),
           std::pair("run x -o y --preset bets", "did you mean best?"),
-          std::pair("run x -o y --write ao,shadde", "did you mean shaded?"),
-          std::pair("inspect x --json=--g", "json: '--g' given, expected true | false")}) {
+          std::pair("run x -o y --write ao,shadde", "did you mean shaded?"), std::pair("run -o y", "PATH is missing"),
+          std::pair("compare x y z", "2 PATH expected at most"), std::pair("run x -o", "--out needs a value"),
+          std::pair("run x -o y --radius", "--radius needs a value: m, 0 or more"),
+          std::pair("run x -o y --radius 1 --radius 2", "--radius is given more than once"),
+          std::pair("run x -o y --overwrite=maybe", "'maybe' given, expected yes | no"),
+          std::pair("run x -o y --settings /nowhere.json", "settings: the file is missing"),
+          std::pair("run x -o y --settings /dev/null", "settings line 1: not JSON"),
+          std::pair("run x -o y --hbao.directions 3",
+                    "hbao.directions: is a setting of the method hbao, and the method is cacao"),
+          std::pair("inspect x --json=--g", "json: '--g' given, expected yes | no")}) {
         const Ran ran = run_program(words);
         EXPECT_EQ(ran.exit_code, 1) << words;
         EXPECT_NE(ran.err.find(meant), std::string::npos) << ran.err;
     }
     EXPECT_EQ(run_program("run x -o y --unheard-of").err.find("did you mean"), std::string::npos);
+}
+
+TEST_F(CliTest, a_switch_takes_the_words_yes_and_no_and_no_path) {
+    const auto has_page = [&](const std::string& flags) {
+        const Ran ran = run("--frames 0 " + flags);
+        EXPECT_EQ(ran.exit_code, 0) << flags << ran.err;
+        return fs::exists(folder / "out" / "index.html");
+    };
+    for (const char* off : {"--page no", "--page=false", "--page false"})
+        EXPECT_FALSE(has_page(fmt::format("--overwrite yes {}", off))) << off;
+    for (const char* on : {"--page", "--page yes", "--page=true"})
+        EXPECT_TRUE(has_page(fmt::format("--overwrite=true {}", on))) << on;
+    EXPECT_EQ(run("--overwrite no").exit_code, 1) << "the results of an earlier run stay";
+    const Ran path = run_program(
+        fmt::format("run --overwrite {} -o {} --frames 0", (folder / "capture").string(), (folder / "out").string()));
+    EXPECT_EQ(path.exit_code, 0) << "a path after a switch is a path: " << path.err;
 }
 
 TEST(CliHelpTest, methods_and_devices_are_listed) {

@@ -97,7 +97,7 @@ TEST(Parameters, PrintedValuesReadBackTheSameAndAreShort) {
 TEST(Parameters, RangesReadAsPeopleWriteThem) {
     Settings settings;
     const auto rows = settings.parameters();
-    EXPECT_EQ(range_text(rows[adaptive]), "true | false");
+    EXPECT_EQ(range_text(rows[adaptive]), "yes | no");
     EXPECT_EQ(range_text(rows[passes]), "0 .. 8");
     EXPECT_EQ(range_text(rows[radius]), "m, 0 .. 100000");
     EXPECT_EQ(range_text(rows[sigma]), "rad, 0 or more");
@@ -128,7 +128,7 @@ TEST(Parameters, WhatCannotBeIsRefusedByNameAndLeavesTheSettingAlone) {
         EXPECT_NE(refusal(rows[limit], text), "") << text;
     EXPECT_EQ(settings.level, Level::high);
     EXPECT_FALSE(settings.limit);
-    EXPECT_TRUE(says(refusal(rows[adaptive], "maybe"), "true | false"));
+    EXPECT_TRUE(says(refusal(rows[adaptive], "maybe"), "yes | no"));
     EXPECT_EQ(settings.radius, 0.5F);
     EXPECT_EQ(settings.passes, 2);
     EXPECT_EQ(settings.quality, "high");

@@ -62,7 +62,7 @@ void add_arch(Bodies& bodies, double x, double from_y, double to_y, double sprin
 
 } // namespace
 
-Scene columns() {
+Scene columns() { // NOLINT(readability-function-size): a table
     Scene scene{.name = "columns",
                 .summary = "a hall with two arcades of columns, niches, coffers and fallen stones",
                 .far_m = 13};

@@ -150,7 +150,7 @@ void add_fence(Bodies& bodies, const Vector2d& from, const Vector2d& to) {
 
 } // namespace
 
-Scene outdoor() {
+Scene outdoor() { // NOLINT(readability-function-size): a table
     Scene scene{.name = "outdoor",
                 .summary = "a lane with houses, trees, fences, cars and poles, to 150 m; AO radius 2 m",
                 .ao_radius_m = 2,

@@ -8,7 +8,7 @@
 
 namespace scanshade::scene {
 
-Scene staircase() {
+Scene staircase() { // NOLINT(readability-function-size): a table
     Scene scene{.name = "staircase", .summary = "a stairwell with two flights, railings, niches and things kept below"};
     Bodies& bodies = scene.bodies;
     Random random(11);

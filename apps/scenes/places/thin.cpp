@@ -10,7 +10,7 @@
 
 namespace scanshade::scene {
 
-Scene thin() {
+Scene thin() { // NOLINT(readability-function-size): a table
     Scene scene{.name = "thin", .summary = "wires, grates, railings, wheels, cages and stems of 5 to 20 mm"};
     Bodies& bodies = scene.bodies;
     Random random(71);

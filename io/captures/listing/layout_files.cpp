@@ -121,9 +121,10 @@ nlohmann::json parsed_json(const std::string& text, const fs::path& file) {
     } catch (const nlohmann::json::parse_error& failure) {
         const std::size_t offset = std::min(text.size(), failure.byte > 0 ? failure.byte - 1 : 0);
         const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(offset), '\n');
-        throw Error(fmt::format("{}: not JSON, or NaN or infinity in it", at_line(file, static_cast<int>(line))));
-    } catch (const nlohmann::json::exception& failure) { // numbers beyond double
-        throw Error(fmt::format("{}: not usable JSON: {}", file.string(), failure.what()));
+        throw Error(
+            fmt::format("{}: {}", at_line(file, static_cast<int>(line)), json_problem(failure.id, failure.what())));
+    } catch (const nlohmann::json::exception& failure) {
+        throw Error(fmt::format("{}: {}", file.string(), json_problem(failure.id, failure.what())));
     } catch (const Outage&) {
         throw;
     } catch (const Error& failure) {

@@ -112,6 +112,53 @@ Camera camera_of(const Eigen::Matrix4d& k, cv::Size size, const fs::path& file) 
 
 constexpr std::uint64_t longest_name = 1000, frame_header = 16 * sizeof(float) + 4 * sizeof(std::uint64_t);
 
+/// Appends the frames from the header's end on. Where one does not fit in the file, it and those after it are left out,
+/// with a warning.
+void add_frames(Capture& capture, const std::shared_ptr<Sens>& sens, Fields header, std::uint64_t count,
+                bool coloured) {
+    const fs::path& path = sens->file.path();
+    const std::uint64_t end = sens->file.size();
+    // A writer that died leaves 0: then what follows are frames to the end of the file.
+    for (std::uint64_t i = 0; count > 0 ? i < count : header.at() < end; ++i) {
+        const std::uint64_t begin = header.at();
+        const auto damage = [&](const std::string& what) {
+            capture.warnings.push_back(fmt::format("{}: frame {} at byte {}: {}; it and those after it are left out.",
+                                                   path.string(), i, begin, what));
+        };
+        if (end - begin < frame_header) {
+            damage(fmt::format("{} are left, expected {}", counted(end - begin, "byte"), frame_header));
+            break;
+        }
+        const Eigen::Matrix4d pose = header.matrix();
+        const auto numbers = header.next<std::array<std::uint64_t, 4>>();
+        PackedImages images{header.at(), numbers[2], header.at() + numbers[2], numbers[3]};
+        const std::uint64_t rest = end - header.at();
+        if (images.colour_bytes > rest || images.depth_bytes > rest - images.colour_bytes) {
+            damage(fmt::format("images of {} and {} bytes, but {} are left", images.colour_bytes, images.depth_bytes,
+                               rest));
+            break;
+        }
+        header.skip(images.colour_bytes + images.depth_bytes);
+        CaptureEntry entry;
+        entry.name = fmt::format("{:06}", i);
+        entry.depth = path.string();
+        entry.container = sens;
+        entry.place = sens->frames.size();
+        if (coloured && images.colour_bytes > 0)
+            entry.colour = path.string();
+        entry.stamp_s = static_cast<double>(numbers[1]) * 1e-6;
+        entry.colour_stamp_s = static_cast<double>(numbers[0]) * 1e-6;
+        MatrixPose checked =
+            checked_pose(pose, fmt::format("{}: pose of frame {} at byte {}", path.string(), i, begin));
+        entry.world_from_camera = checked.world_from_camera;
+        for (std::string* sentence : {&checked.warning, &checked.problem})
+            if (!sentence->empty())
+                entry.warnings.push_back(std::move(*sentence));
+        sens->frames.push_back(images);
+        capture.entries.push_back(std::move(entry));
+    }
+}
+
 } // namespace
 
 bool is_sens(std::string_view start) {
@@ -158,45 +205,7 @@ Listing list_sens(const fs::path& path) {
     if (count > left / frame_header)
         throw Error(fmt::format("{}: {} frames according to byte {}, but {} are left", path.string(), count,
                                 header.at() - 8, counted(left, "byte")));
-    // A writer that died leaves 0: then what follows are frames to the end of the file.
-    for (std::uint64_t i = 0; count > 0 ? i < count : header.at() < end; ++i) {
-        const std::uint64_t begin = header.at();
-        const auto damage = [&](const std::string& what) {
-            capture.warnings.push_back(fmt::format("{}: frame {} at byte {}: {}; it and those after it are left out.",
-                                                   path.string(), i, begin, what));
-        };
-        if (end - begin < frame_header) {
-            damage(fmt::format("{} are left, expected {}", counted(end - begin, "byte"), frame_header));
-            break;
-        }
-        const Eigen::Matrix4d pose = header.matrix();
-        const auto numbers = header.next<std::array<std::uint64_t, 4>>();
-        PackedImages images{header.at(), numbers[2], header.at() + numbers[2], numbers[3]};
-        const std::uint64_t rest = end - header.at();
-        if (images.colour_bytes > rest || images.depth_bytes > rest - images.colour_bytes) {
-            damage(fmt::format("images of {} and {} bytes, but {} are left", images.colour_bytes, images.depth_bytes,
-                               rest));
-            break;
-        }
-        header.skip(images.colour_bytes + images.depth_bytes);
-        CaptureEntry entry;
-        entry.name = fmt::format("{:06}", i);
-        entry.depth = path.string();
-        entry.container = sens;
-        entry.place = sens->frames.size();
-        if (coloured && images.colour_bytes > 0)
-            entry.colour = path.string();
-        entry.stamp_s = static_cast<double>(numbers[1]) * 1e-6;
-        entry.colour_stamp_s = static_cast<double>(numbers[0]) * 1e-6;
-        MatrixPose checked =
-            checked_pose(pose, fmt::format("{}: pose of frame {} at byte {}", path.string(), i, begin));
-        entry.world_from_camera = checked.world_from_camera;
-        for (std::string* sentence : {&checked.warning, &checked.problem})
-            if (!sentence->empty())
-                entry.warnings.push_back(std::move(*sentence));
-        sens->frames.push_back(images);
-        capture.entries.push_back(std::move(entry));
-    }
+    add_frames(capture, sens, std::move(header), count, coloured);
     if (capture.entries.empty())
         throw NoFrames(path.string() + ": no whole frame in this .sens");
     listing.find_camera = [=](cv::Size, std::vector<std::string>& warnings) -> std::optional<CameraFile> {

@@ -144,25 +144,27 @@ class LayeredChunk {
         return value;
     }
 
+    /// What differs from the last point of the same channel: two bits for the number of the return, then one each for
+    /// returns, angle, time, source and channel.
+    std::uint32_t changes_of(const Point& real) const {
+        const Point& last = channels_[channels_[real.channel] ? real.channel : current_]->last;
+        const unsigned step = (real.number - last.number) & 15;
+        return (step == 0    ? 0U
+                : step == 1  ? 1U
+                : step == 15 ? 2U
+                             : 3U) |
+               (real.returns != last.returns ? 4U : 0U) | (real.angle != last.angle ? 8U : 0U) |
+               (real.time != last.time ? 16U : 0U) | (real.source != last.source ? 32U : 0U) |
+               (real.channel != current_ ? 64U : 0U);
+    }
+
     bool code_point(Record<Coder> now) {
         const Point real = Coder::encodes ? Point(now) : channels_[current_]->last;
         Coder& first_layer = *layers_[xy].coder;
         Channel& before = *channels_[current_];
         const unsigned e = (before.last.number == 1 ? 1U : 0U) + (before.last.number >= before.last.returns ? 2U : 0U) +
                            (before.time_changed ? 4U : 0U);
-        std::uint32_t c = 0;
-        if constexpr (Coder::encodes) {
-            const Point& last = channels_[real.channel] ? channels_[real.channel]->last : before.last;
-            const unsigned step = (real.number - last.number) & 15;
-            c = (step == 0    ? 0U
-                 : step == 1  ? 1U
-                 : step == 15 ? 2U
-                              : 3U) |
-                (real.returns != last.returns ? 4U : 0U) | (real.angle != last.angle ? 8U : 0U) |
-                (real.time != last.time ? 16U : 0U) | (real.source != last.source ? 32U : 0U) |
-                (real.channel != current_ ? 64U : 0U);
-        }
-        c = first_layer.symbol(before.changed[e], c);
+        const std::uint32_t c = first_layer.symbol(before.changed[e], Coder::encodes ? changes_of(real) : 0);
         if (c & 64) {
             const unsigned to =
                 (current_ + 1 + first_layer.symbol(before.switches, (real.channel - current_ - 1U) & 3)) & 3;
