@@ -1,4 +1,4 @@
-#include "ao/hbao/hbao.h"
+#include "ao/classics/hbao.h"
 
 #include "ao/screen/fitted_curves.h"
 #include "shaders/shared/hbao.h"

@@ -1,4 +1,4 @@
-#include "ao/hemisphere/hemisphere.h"
+#include "ao/classics/hemisphere.h"
 
 #include "shaders/shared/point_samples.h"
 

@@ -1,4 +1,4 @@
-#include "ao/alchemy/alchemy.h"
+#include "ao/classics/alchemy.h"
 
 #include "ao/screen/fitted_curves.h"
 #include "shaders/shared/alchemy.h"

@@ -1,4 +1,4 @@
-#include "ao/hdao/hdao.h"
+#include "ao/classics/hdao.h"
 
 #include "ao/screen/fitted_curves.h"
 #include "shaders/shared/hdao.h"

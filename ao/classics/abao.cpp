@@ -1,4 +1,4 @@
-#include "ao/abao/abao.h"
+#include "ao/classics/abao.h"
 
 #include "ao/screen/fitted_curves.h"
 #include "shaders/shared/abao.h"

@@ -1,4 +1,4 @@
-#include "ao/ssdo/ssdo.h"
+#include "ao/classics/ssdo.h"
 
 #include "ao/screen/fitted_curves.h"
 #include "shaders/shared/ssdo.h"

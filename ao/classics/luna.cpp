@@ -1,4 +1,4 @@
-#include "ao/luna/luna.h"
+#include "ao/classics/luna.h"
 
 #include "projection/base/error.h"
 #include "shaders/shared/point_samples.h"
