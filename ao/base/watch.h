@@ -9,7 +9,8 @@ namespace scanshade {
 /// Adds what passed since the last lap, or since it was made, to a method's timings.
 class Watch {
   public:
-    explicit Watch(Timings& timings) : timings_(timings) {}
+    /// `begun`: when the first stage began.
+    explicit Watch(Timings& timings, const Stopwatch& begun = {}) : timings_(timings), stopwatch_(begun) {}
     void lap(const std::string& name) { add(timings_, name, stopwatch_.lap_ms()); }
 
   private:

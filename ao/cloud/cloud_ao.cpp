@@ -27,7 +27,7 @@ PointVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vect
     const CloudSetup setup{options_, device_, up_, viewpoint_};
     if (!options_.sky && cloud.points.size() > points_at_once(setup))
         return in_tiles(setup, cloud, scanner);
-    CloudWork work(setup, cloud, scanner);
+    CloudWork work = CloudWork::of_cloud(setup, cloud, scanner);
     PointVisibility found = work.run();
     signs_ = work.take_signs();
     return found;

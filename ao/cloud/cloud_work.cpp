@@ -25,7 +25,81 @@ namespace {
 using Eigen::Vector3d, Eigen::Vector3f;
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 
+/// Recorded normals, where they are used.
+std::span<const Vector3d> normals_used(const CloudAoOptions& options, const PointSet& cloud) {
+    return options.normals == CloudNormals::estimated ? std::span<const Vector3d>() : cloud.normals;
+}
+
+NormalOrientation orientation_of(const CloudSetup& setup, const std::vector<Vector3d>& some,
+                                 const std::optional<Vector3d>& scanner, bool z_up) {
+    using Kind = NormalOrientation::Kind;
+    const CloudAoOptions& options = setup.options;
+    NormalOrientation found;
+    if (setup.viewpoint)
+        found = {Kind::viewpoint, *setup.viewpoint, "the position given by --cloud.outside"};
+    else if (options.outside == "auto")
+        found = guessed_orientation(some, scanner, z_up);
+    else
+        found = {options.outside == "up"        ? Kind::direction
+                 : options.outside == "outward" ? Kind::outward
+                                                : Kind::inward,
+                 setup.up, options.outside + ", as given"};
+    if (found.kind == Kind::direction || found.kind == Kind::terrain)
+        found.point = setup.up;
+    return found;
+}
+
+/// Visibility changes slowly against the radius: the more points the radius spans, the more may share their rays.
+RaysAndMeans rays_and_means(const CloudAoOptions& options, const CloudDecisions& decided, bool on_gpu) {
+    const double spacings = options.sky || !(decided.spacing > 0) ? 0 : decided.radius / decided.spacing;
+    const std::size_t level = spacings > 120 ? 2 : spacings > 60 ? 1 : 0;
+    constexpr int of_gpu = 64; // costs a GPU less time than the other stages cost the host
+    const int rays = options.rays > 0 ? options.rays : on_gpu ? of_gpu : std::array{16, 8, 4}[level];
+    return {rays, options.smooth >= 0 ? options.smooth : std::array{2, 3, 5}[level]};
+}
+
+std::string note_of(const RaysAndMeans& chosen) {
+    return fmt::format("{} rays a point, {} times the mean over neighbours.", chosen.rays, chosen.passes);
+}
+
 } // namespace
+
+DecidedCloud decide(const CloudSetup& setup, const PointSet& cloud, const std::optional<Vector3d>& scanner,
+                    Indices finite, std::optional<double> sample_of) {
+    const CloudAoOptions& options = setup.options;
+    DecidedCloud decided;
+    CloudDecisions& found = decided.decisions;
+    std::vector<Vector3d> some = sample_of ? std::vector<Vector3d>(cloud.points.begin(), cloud.points.end())
+                                           : sampled(cloud.points, finite, enough_to_judge);
+    found.extent = extent_of(some);
+    const auto beyond = [&](const Vector3d& point) {
+        return (point - found.extent.centre).norm() > found.extent.farthest;
+    };
+    std::erase_if(some, beyond);
+    decided.strays = indices_where(finite, [&](std::uint32_t i) { return beyond(cloud.points[i]); });
+    decided.within = decided.strays.empty()
+                         ? std::move(finite)
+                         : indices_where(finite, [&](std::uint32_t i) { return !beyond(cloud.points[i]); });
+    found.points = static_cast<double>(decided.within.size());
+    found.orientation = orientation_of(setup, some, scanner, cloud.z_up);
+    if (!some.empty()) {
+        const double share = sample_of
+                                 ? std::min(1.0, static_cast<double>(cloud.points.size()) / std::max(*sample_of, 1.0))
+                                 : static_cast<double>(some.size()) / found.points;
+        // That of a sample is larger by the root of its share: points are on surfaces.
+        found.spacing = static_cast<double>(spacing_of(LocalCloud(some))) * std::sqrt(share);
+        found.radius = options.radius > 0 ? options.radius : default_radius(found.extent.size, found.spacing);
+        decided.notes.push_back(
+            fmt::format("points stand {:.4g} apart (median), over {:.4g}.", found.spacing, found.extent.size));
+        decided.notes.push_back(
+            options.sky ? "visibility is the share of the sky, at any distance."
+                        : fmt::format("radius {:.4g} ({}).", found.radius,
+                                      options.radius > 0 ? "as given"
+                                                         : "a twentieth of the extent, within 10 .. 200 spacings"));
+    }
+    decided.notes.push_back(note_of(rays_and_means(options, found, setup.device)));
+    return decided;
+}
 
 std::size_t points_at_once(const CloudSetup& setup) {
     constexpr double bytes_per_point = 420; // the file's records among them; with a GPU it is less
@@ -33,70 +107,60 @@ std::size_t points_at_once(const CloudSetup& setup) {
     return setup.device ? std::min(fitting, CloudGpu(*setup.device).most_points()) : fitting;
 }
 
-CloudWork::CloudWork(const CloudSetup& setup, const PointSet& cloud, const std::optional<Vector3d>& scanner)
-    : setup_(setup), options_(setup.options), scanner_(scanner), cloud_(cloud), watch_(result_.timings),
-      sides_(setup.options, setup.up, cloud.z_up) {
+CloudWork::CloudWork(Role role, const CloudSetup& setup, const PointSet& cloud, const std::optional<Vector3d>& scanner,
+                     Start start)
+    : role_(role), setup_(setup), options_(setup.options), scanner_(scanner), cloud_(cloud), whole_(start.whole),
+      decided_(std::move(start.decided.decisions)), watch_(result_.timings, start.begun),
+      rays_(rays_and_means(options_, decided_, setup.device && role != Role::part)),
+      directions_(rays_.rays, options_.seed), sides_(options_, setup.up, cloud.z_up),
+      valid_(std::move(start.decided.within)), strays_(std::move(start.decided.strays)), twins_(std::move(start.twins)),
+      normals_refused_(whole_ && whole_->normals_refused) {
     if (setup.device)
         gpu_.emplace(*setup.device);
     if (cloud.from_scanner)
         sides_.seen_from = scanner;
-    valid_ = finite(cloud.points);
-    twins_ = take_out_twins(cloud.points, recorded() ? cloud.normals : std::span<const Vector3d>(), valid_);
-    std::vector<Vector3d> some = sampled(cloud.points, valid_, enough_to_judge);
-    settle_extent(some);
-    settle_orientation(some);
-    settle_radius(some, static_cast<double>(some.size()) / static_cast<double>(valid_.size()));
-    settle_rays();
-    watch_.lap("survey");
+    sides_.orientation = decided_.orientation;
+    result_.radius = decided_.radius;
+    result_.spacing = decided_.spacing;
+    result_.notes = std::move(start.decided.notes);
+    if (role == Role::part) // others are told by what was decided
+        result_.notes.push_back(note_of(rays_));
+    if (role != Role::tile)
+        watch_.lap("survey");
 }
 
-CloudWork::CloudWork(const CloudSetup& setup, const PointSet& sample, const std::optional<Vector3d>& scanner,
-                     const WholeSize& whole)
-    : setup_(setup), options_(setup.options), scanner_(scanner), cloud_(sample), watch_(result_.timings),
-      sides_(setup.options, setup.up, sample.z_up) {
-    if (setup.device) // settle_rays() asks
-        gpu_.emplace(*setup.device);
-    valid_ = finite(sample.points);
-    std::vector<Vector3d> some(sample.points.begin(), sample.points.end());
-    settle_extent(some);
-    settle_orientation(some);
-    settle_radius(some, std::min(1.0, static_cast<double>(sample.points.size()) / std::max(whole.points, 1.0)));
-    settle_rays();
+CloudWork CloudWork::of_cloud(const CloudSetup& setup, const PointSet& cloud, const std::optional<Vector3d>& scanner) {
+    Start start;
+    Indices points = finite(cloud.points);
+    start.twins = take_out_twins(cloud.points, normals_used(setup.options, cloud), points);
+    start.decided = decide(setup, cloud, scanner, std::move(points));
+    return {Role::cloud, setup, cloud, scanner, std::move(start)};
 }
 
-CloudWork::CloudWork(const CloudSetup& setup, const PointSet& cloud, const std::optional<Vector3d>& scanner,
-                     const CloudDecisions& whole)
-    : setup_(setup), options_(setup.options), scanner_(scanner), cloud_(cloud), part_(true), watch_(result_.timings),
-      sides_(setup.options, setup.up, cloud.z_up), extent_(whole.extent),
-      noise_exceeds_spacing_(whole.noise_exceeds_spacing) {
-    if (setup.device)
-        gpu_.emplace(*setup.device);
-    if (cloud.from_scanner)
-        sides_.seen_from = scanner;
-    valid_ = finite(cloud.points);
-    twins_ = take_out_twins(cloud.points, recorded() ? cloud.normals : std::span<const Vector3d>(), valid_);
-    sides_.orientation = whole.orientation;
-    result_.radius = whole.radius;
-    result_.spacing =
-        whole.spacing * std::sqrt(whole.points / static_cast<double>(std::max<std::size_t>(valid_.size(), 1)));
-    settle_rays();
-    watch_.lap("survey");
+CloudWork CloudWork::of_part(const CloudSetup& setup, const PointSet& part, const std::optional<Vector3d>& scanner,
+                             const CloudDecisions& whole) {
+    Start start;
+    Indices points = finite(part.points);
+    start.twins = take_out_twins(part.points, normals_used(setup.options, part), points);
+    start.decided = {whole, std::move(points), {}, {}};
+    CloudDecisions& decided = start.decided.decisions;
+    decided.points = static_cast<double>(std::max<std::size_t>(start.decided.within.size(), 1));
+    decided.spacing = whole.spacing * std::sqrt(whole.points / decided.points);
+    return {Role::part, setup, part, scanner, std::move(start)};
 }
 
-CloudWork::CloudWork(const CloudSetup& setup, const PointSet& tile, const OfWhole& whole)
-    : setup_(setup), options_(setup.options), cloud_(tile), whole_(&whole), part_(true), watch_(result_.timings),
-      sides_(setup.options, setup.up, tile.z_up), extent_(whole.decisions.extent),
-      normals_refused_(whole.normals_refused) {
-    if (setup.device)
-        gpu_.emplace(*setup.device);
-    valid_.resize(tile.points.size());
-    std::iota(valid_.begin(), valid_.end(), 0U);
-    if (whole.twins)
-        twins_ = all_twins(tile.points, recorded() ? tile.normals : std::span<const Vector3d>(), valid_);
-    sides_.orientation = whole.decisions.orientation;
-    result_.radius = whole.decisions.radius;
-    result_.spacing = whole.decisions.spacing;
-    settle_rays();
+CloudWork CloudWork::of_tile(const CloudSetup& setup, const PointSet& tile, const OfWhole& whole) {
+    Start start;
+    Indices points(tile.points.size());
+    std::iota(points.begin(), points.end(), 0U);
+    if (whole.twins) {
+        const bool used = !whole.normals_refused;
+        start.twins =
+            all_twins(tile.points, used ? normals_used(setup.options, tile) : std::span<const Vector3d>(), points);
+    }
+    start.decided = {whole.decisions, std::move(points), {}, {}};
+    start.whole = &whole;
+    return {Role::tile, setup, tile, std::nullopt, std::move(start)};
 }
 
 PointVisibility CloudWork::run() {
@@ -145,19 +209,10 @@ void CloudWork::copy_to_twins() {
 WholeSides CloudWork::settle_sides() {
     CloudSurface surface = planes_of(valid_, nullptr).surface;
     fitted_ = {}; // tiles tell of themselves
-    drop_strays(surface, extent_.centre, static_cast<double>(surface.spacing));
+    drop_strays(surface, decided_.extent.centre, static_cast<double>(surface.spacing));
     std::optional<DiscRays> rays;
     std::vector<float> known = sides_.settle(surface, rays, recorded());
     return {std::move(surface), std::move(known)};
-}
-
-CloudDecisions CloudWork::decisions() const {
-    return {extent_,
-            sides_.orientation,
-            result_.radius,
-            result_.spacing,
-            static_cast<double>(valid_.size()),
-            noise_exceeds_spacing_};
 }
 
 PointVisibility CloudWork::of_strays(const CloudSetup& setup, const PointSet& strays,
@@ -165,10 +220,12 @@ PointVisibility CloudWork::of_strays(const CloudSetup& setup, const PointSet& st
     CloudAoOptions options = setup.options;
     options.radius = radius;
     const CloudSetup alone_setup{options, nullptr, setup.up, setup.viewpoint};
-    CloudWork alone(alone_setup, strays, scanner);
-    alone.part_ = true;
-    alone.result_.spacing = std::min(alone.result_.spacing, spacing);
-    return alone.run();
+    Start start;
+    Indices points = finite(strays.points);
+    start.twins = take_out_twins(strays.points, normals_used(options, strays), points);
+    start.decided = decide(alone_setup, strays, scanner, std::move(points));
+    start.decided.decisions.spacing = std::min(start.decided.decisions.spacing, spacing);
+    return CloudWork(Role::strays, alone_setup, strays, scanner, std::move(start)).run();
 }
 
 /// Made as late as possible: the rays need the memory.
@@ -181,32 +238,6 @@ void CloudWork::require_results() {
                              [&] { sides_known_.assign(is_checked() ? count : 0, 0); },
                              [&] { signs_.resize(options_.keep_signs ? count : 0); });
 }
-
-void CloudWork::settle_orientation(const std::vector<Vector3d>& some) {
-    using Kind = NormalOrientation::Kind;
-    if (setup_.viewpoint)
-        sides_.orientation = {Kind::viewpoint, *setup_.viewpoint, "the position given by --cloud.outside"};
-    else if (options_.outside == "auto")
-        sides_.orientation = guessed_orientation(some, scanner_, cloud_.z_up);
-    else
-        sides_.orientation = {options_.outside == "up"        ? Kind::direction
-                              : options_.outside == "outward" ? Kind::outward
-                                                              : Kind::inward,
-                              setup_.up, options_.outside + ", as given"};
-    if (sides_.orientation.kind == Kind::direction || sides_.orientation.kind == Kind::terrain)
-        sides_.orientation.point = setup_.up;
-}
-
-/// Points that lie beyond the cloud are computed by themselves.
-void CloudWork::settle_extent(std::vector<Vector3d>& some) {
-    extent_ = extent_of(some);
-    std::erase_if(some, [&](const Vector3d& point) { return beyond(point); });
-    strays_ = indices_where(valid_, [&](std::uint32_t i) { return beyond(cloud_.points[i]); });
-    if (!strays_.empty())
-        valid_ = indices_where(valid_, [&](std::uint32_t i) { return !beyond(cloud_.points[i]); });
-}
-
-bool CloudWork::beyond(const Vector3d& point) const { return (point - extent_.centre).norm() > extent_.farthest; }
 
 /// These points, with the normals that they have.
 CloudWork::Picked CloudWork::picked(const Indices& indices) const {
@@ -224,7 +255,7 @@ CloudWork::Picked CloudWork::picked(const Indices& indices) const {
 /// Strays by themselves, as a cloud of its own about its own middle: what they say of normals and sides must not
 /// concern the others. A few of them make no surface; so do strays of strays.
 void CloudWork::compute_strays() {
-    if (strays_.size() < fewest_strays || part_)
+    if (strays_.size() < fewest_strays || role_ != Role::cloud)
         return;
     const auto [points, normals] = picked(strays_);
     const PointVisibility found = of_strays(setup_, {points, normals}, scanner_, result_.radius, result_.spacing);
@@ -237,8 +268,8 @@ void CloudWork::compute_strays() {
 
 ThinnedCheck CloudWork::check_of_whole() const {
     const std::size_t points = whole_ ? static_cast<std::size_t>(whole_->decisions.points) : valid_.size();
-    return (part_ && !whole_) || options_.sky ? ThinnedCheck()
-                                              : thinned_check(points, result_.radius / result_.spacing);
+    const bool checked = role_ == Role::cloud || role_ == Role::tile;
+    return !checked || options_.sky ? ThinnedCheck() : thinned_check(points, result_.radius / result_.spacing);
 }
 
 bool CloudWork::is_checked() const { return check_of_whole().keep > 0; }
@@ -262,7 +293,9 @@ void CloudWork::compute_thinned() {
         options.normals = CloudNormals::recorded;
     const PointSet part{points, normals, {}, cloud_.z_up, cloud_.from_scanner};
     const CloudSetup setup{options, setup_.device, setup_.up, setup_.viewpoint};
-    CloudWork some(setup, part, scanner_, decisions());
+    CloudDecisions whole = decided_;
+    whole.orientation = sides_.orientation;
+    CloudWork some = of_part(setup, part, scanner_, whole);
     const Repeatability found = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check,
                                               order_.empty() ? valid_ : order_);
     order_.clear();
@@ -278,7 +311,7 @@ void CloudWork::compute_thinned() {
 }
 
 void CloudWork::tell_error() {
-    if (part_)
+    if (role_ != Role::cloud)
         return;
     ErrorSum sum;
     for (const float error : result_.error)
@@ -290,37 +323,6 @@ void CloudWork::tell_error() {
     result_.notes.push_back(told.note);
     if (told.doubt)
         doubt(*told.doubt);
-}
-
-/// The spacing of a sample is larger by the root of its share: points are on surfaces.
-void CloudWork::settle_radius(const std::vector<Vector3d>& some, double share) {
-    if (some.empty())
-        return;
-    result_.spacing = static_cast<double>(spacing_of(LocalCloud(some))) * std::sqrt(share);
-    const double extent = extent_.size;
-    result_.radius = options_.radius > 0 ? options_.radius : default_radius(extent, result_.spacing);
-    result_.notes.push_back(fmt::format("points stand {:.4g} apart (median), over {:.4g}.", result_.spacing, extent));
-    if (options_.sky)
-        result_.notes.push_back("visibility is the share of the sky, at any distance.");
-    else
-        result_.notes.push_back(
-            fmt::format("radius {:.4g} ({}).", result_.radius,
-                        options_.radius > 0 ? "as given" : "a twentieth of the extent, within 10 .. 200 spacings"));
-}
-
-/// Visibility changes slowly against the radius: the more points the radius spans, the more may share their rays.
-void CloudWork::settle_rays() {
-    const double spacings = options_.sky || !(result_.spacing > 0) ? 0 : result_.radius / result_.spacing;
-    const int level = spacings > 120 ? 2 : spacings > 60 ? 1 : 0;
-    constexpr int on_gpu = 64;            // costs a GPU less time than the other stages cost the host
-    const bool checks = part_ && !whole_; // with as many rays on any machine: expected errors were fitted to these
-    const int rays = options_.rays > 0 ? options_.rays
-                     : gpu_ && !checks ? on_gpu
-                                       : std::array{16, 8, 4}[static_cast<std::size_t>(level)];
-    passes_ = options_.smooth >= 0 ? options_.smooth : std::array{2, 3, 5}[static_cast<std::size_t>(level)];
-    directions_.emplace(rays, options_.seed);
-    if (!whole_) // which says so
-        result_.notes.push_back(fmt::format("{} rays a point, {} times the mean over neighbours.", rays, passes_));
 }
 
 /// Values for `core`, a part of `round`; on the GPU if its memory suffices.
@@ -345,9 +347,9 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
     Fitted planes = planes_of(round, gpu);
     CloudSurface& surface = planes.surface;
     FittedCloud& fitted = planes.points;
-    if (!part_)
+    if (role_ == Role::cloud)
         doubt_lines(surface);
-    const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
+    const std::vector<std::uint32_t> lonely = drop_strays(surface, decided_.extent.centre, result_.spacing);
     std::optional<DiscRays> rays;
     std::vector<float> side_known;
     if (!whole_)
@@ -360,7 +362,7 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
     const Wanted wanted = wanted_of(core, round, fitted);
     const Untouched<float> values = visibility_of(surface, std::move(rays), wanted, gpu);
     attach(planes, values, side_known, round, wanted);
-    if (!part_ && fitted.empty()) {
+    if (role_ == Role::cloud && fitted.empty()) {
         order_.resize(round.size());
         tbb::parallel_for(std::size_t(0), order_.size(),
                           [&](std::size_t i) { order_[i] = round[surface.tree.original(i)]; });
@@ -396,7 +398,7 @@ Untouched<float> CloudWork::visibility_of(const CloudSurface& surface, std::opti
     Untouched<float> values;
     if (gpu) {
         rays.reset();
-        values = gpu->visibility(surface, *directions_, {radius, up, mean_falloff(radius), passes_});
+        values = gpu->visibility(surface, directions_, {radius, up, mean_falloff(radius), rays_.passes});
         watch_.lap("rays and means");
     } else {
         if (!rays)
@@ -407,15 +409,15 @@ Untouched<float> CloudWork::visibility_of(const CloudSurface& surface, std::opti
         std::vector<char> asked(surface.size(), 1);
         if (!wanted.fitted.empty()) {
             tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) { asked[i] = wanted.has(surface, i); });
-            asked = asked_by_means(surface, std::move(asked), passes_);
+            asked = asked_by_means(surface, std::move(asked), rays_.passes);
         }
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.tree.leaves(), 8), [&](const auto& range) {
             for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf)
-                rays->open(leaf, *directions_, radius, up, asked, values);
+                rays->open(leaf, directions_, radius, up, asked, values);
         });
         rays.reset();
         watch_.lap("rays");
-        for (int pass = 0; pass < passes_; ++pass)
+        for (int pass = 0; pass < rays_.passes; ++pass)
             values = smoothed(surface, values, radius);
         watch_.lap("means");
     }
@@ -575,14 +577,14 @@ CloudWork::Fitted CloudWork::planes_of(const Indices& which, CloudGpu* gpu) {
 /// Noise of the cloud, which a tile is told, and another part of a cloud finds by itself.
 FittedCloud CloudWork::without_noise(const LocalCloud& local, std::span<const Vector3d> points,
                                      std::span<const Vector3d> normals) {
-    const ThinningGrid grid = thinning_grid(extent_.centre, result_.spacing);
+    const ThinningGrid grid = thinning_grid(decided_.extent.centre, result_.spacing);
     const double radius = options_.sky ? 10 * result_.spacing : result_.radius;
-    if (part_ && !whole_)
-        return fitted_cloud(local, points, normals, radius, grid, noise_exceeds_spacing_);
+    if (role_ == Role::part || role_ == Role::strays)
+        return fitted_cloud(local, points, normals, radius, grid, decided_.noise_exceeds_spacing);
     const std::optional<SharedNoise> noise =
         whole_ ? whole_->noise
                : noise_at(noise_places(cloud_.points, valid_), local, normals, look_for_noise(radius, result_.spacing));
-    noise_exceeds_spacing_ = noise && noise->exceeds_spacing;
+    decided_.noise_exceeds_spacing = noise && noise->exceeds_spacing;
     return noise ? fitted_cloud(local, points, normals, radius, *noise, grid) : FittedCloud();
 }
 
@@ -606,7 +608,7 @@ void CloudWork::tell() {
     if (!strays_.empty())
         result_.notes.push_back(fmt::format("{} points lie more than {:.4g} from the middle of the cloud, far from all "
                                             "others: they are taken for strays and occlude nothing else.",
-                                            strays_.size(), extent_.farthest));
+                                            strays_.size(), decided_.extent.farthest));
     std::size_t unknown = 0;
     for (const Indices* indices : {&valid_, &strays_})
         for (const std::uint32_t i : *indices)

@@ -13,6 +13,7 @@
 #include "ao/cloud/surface/disc_rays.h"
 #include "ao/cloud/surface/fitted_cloud.h"
 #include "ao/cloud/twins.h"
+#include "projection/base/stopwatch.h"
 
 #include <cstdint>
 #include <Eigen/Core>
@@ -35,6 +36,11 @@ struct CloudSetup {
 /// Points in work at once.
 [[nodiscard]] std::size_t points_at_once(const CloudSetup& setup);
 
+/// Rays a point, and how often the mean over neighbours is taken.
+struct RaysAndMeans {
+    int rays, passes;
+};
+
 /// What is decided once for a cloud, and holds for every part of it.
 struct CloudDecisions {
     Extent extent;
@@ -44,10 +50,17 @@ struct CloudDecisions {
     bool noise_exceeds_spacing = false;
 };
 
-/// The number of points in a cloud, of which those given are a sample.
-struct WholeSize {
-    double points;
+/// What was decided, and what it was decided on.
+struct DecidedCloud {
+    CloudDecisions decisions;
+    Indices within, strays; ///< strays lie beyond the cloud
+    std::vector<std::string> notes;
 };
+/// From the points of `cloud` with the numbers `finite`, of which some are looked at. `sample_of`: how many points the
+/// cloud has that they are a sample of; none: they are all of it.
+[[nodiscard]] DecidedCloud decide(const CloudSetup& setup, const PointSet& cloud,
+                                  const std::optional<Eigen::Vector3d>& scanner, Indices finite,
+                                  std::optional<double> sample_of = {});
 
 /// The sides of a cloud of several tiles, settled once on a part of it, so that tiles agree.
 struct WholeSides {
@@ -68,15 +81,13 @@ struct OfWhole {
 class CloudWork {
   public:
     /// A cloud by itself.
-    CloudWork(const CloudSetup& setup, const PointSet& cloud, const std::optional<Eigen::Vector3d>& scanner);
-    /// A sample of a larger cloud, for its decisions().
-    CloudWork(const CloudSetup& setup, const PointSet& sample, const std::optional<Eigen::Vector3d>& scanner,
-              const WholeSize& whole);
+    [[nodiscard]] static CloudWork of_cloud(const CloudSetup& setup, const PointSet& cloud,
+                                            const std::optional<Eigen::Vector3d>& scanner);
     /// A thinned part of another cloud, which computes and checks what is beyond.
-    CloudWork(const CloudSetup& setup, const PointSet& cloud, const std::optional<Eigen::Vector3d>& scanner,
-              const CloudDecisions& whole);
+    [[nodiscard]] static CloudWork of_part(const CloudSetup& setup, const PointSet& part,
+                                           const std::optional<Eigen::Vector3d>& scanner, const CloudDecisions& whole);
     /// A tile with its rim, all of them finite and no strays. `whole` must outlive it.
-    CloudWork(const CloudSetup& setup, const PointSet& tile, const OfWhole& whole);
+    [[nodiscard]] static CloudWork of_tile(const CloudSetup& setup, const PointSet& tile, const OfWhole& whole);
     CloudWork(const CloudWork&) = delete;
     CloudWork& operator=(const CloudWork&) = delete;
 
@@ -95,7 +106,6 @@ class CloudWork {
     /// The cloud is a sample of another one: its sides. The rest of what they tell is in sides(), normals_refused().
     [[nodiscard]] WholeSides settle_sides();
 
-    [[nodiscard]] CloudDecisions decisions() const;
     [[nodiscard]] const SettledSides& sides() const { return sides_; }
     [[nodiscard]] bool normals_refused() const { return normals_refused_; }
     /// Of every point; where CloudAoOptions::keep_signs asks for them.
@@ -110,6 +120,17 @@ class CloudWork {
     static constexpr std::size_t fewest_strays = 64; ///< fewer make no surface
 
   private:
+    /// What the points are: what is beyond them, is checked or told, is not the business of parts.
+    enum class Role { cloud, part, tile, strays };
+    struct Start {
+        Stopwatch begun;
+        DecidedCloud decided;
+        std::vector<Twin> twins;
+        const OfWhole* whole = nullptr; ///< of a tile
+    };
+    CloudWork(Role role, const CloudSetup& setup, const PointSet& cloud, const std::optional<Eigen::Vector3d>& scanner,
+              Start start);
+
     struct Picked {
         std::vector<Eigen::Vector3d> points, normals;
     };
@@ -128,9 +149,6 @@ class CloudWork {
     };
 
     void require_results();
-    void settle_orientation(const std::vector<Eigen::Vector3d>& some);
-    void settle_extent(std::vector<Eigen::Vector3d>& some);
-    [[nodiscard]] bool beyond(const Eigen::Vector3d& point) const;
     [[nodiscard]] FittedCloud without_noise(const LocalCloud& local, std::span<const Eigen::Vector3d> points,
                                             std::span<const Eigen::Vector3d> normals);
     [[nodiscard]] Picked picked(const Indices& indices) const;
@@ -140,8 +158,6 @@ class CloudWork {
     void compute_thinned();
     void copy_to_twins();
     void tell_error();
-    void settle_radius(const std::vector<Eigen::Vector3d>& some, double share);
-    void settle_rays();
     void tile(const Indices& core, const Indices& round);
     void tile(const Indices& core, const Indices& round, CloudGpu* gpu);
     [[nodiscard]] static Wanted wanted_of(const Indices& core, const Indices& round, const FittedCloud& fitted);
@@ -157,27 +173,28 @@ class CloudWork {
     [[nodiscard]] bool recorded() const;
     void tell();
 
+    const Role role_;
     const CloudSetup& setup_;
     const CloudAoOptions& options_;
     std::optional<Eigen::Vector3d> scanner_;
     const PointSet& cloud_;
-    const OfWhole* whole_ = nullptr; ///< of a tile
-    bool part_ = false;              ///< of another cloud
+    const OfWhole* whole_; ///< of a tile, else null
+    CloudDecisions decided_;
     PointVisibility result_;
     std::vector<std::uint8_t> sides_known_; ///< byte_of_side() of a cloud that is still to be checked; else empty
     std::vector<CloudErrorSigns> signs_;    ///< only where asked for
     Watch watch_;
     std::optional<CloudGpu> gpu_;
-    std::optional<DirectionSet> directions_;
+    const RaysAndMeans rays_;
+    const DirectionSet directions_;
     SettledSides sides_;
-    Extent extent_;
     Indices valid_, strays_;  ///< strays lie beyond the cloud
     Indices order_;           ///< the points in the order of the tree; empty where they were fitted
     std::vector<Twin> twins_; ///< copies of points, in neither
-    bool normals_refused_ = false, noise_exceeds_spacing_ = false;
+    bool normals_refused_;
     FittedCounts fitted_;
     double error_by_check_ = 0;
-    int gpu_tiles_ = 0, passes_ = 2;
+    int gpu_tiles_ = 0;
 };
 
 } // namespace scanshade

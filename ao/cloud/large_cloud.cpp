@@ -167,9 +167,10 @@ class LargeCloud {
                     normals.push_back(each.normal.cast<double>());
             }
         const PointSet some{points, normals, {}, source_.z_up()};
-        const CloudWork work(setup_, some, source_.scanner(), WholeSize{distinct_ * static_cast<double>(finite_)});
-        whole_.decisions = work.decisions();
-        result_.notes = work.notes();
+        DecidedCloud decided = scanshade::decide(setup_, some, source_.scanner(), finite(some.points),
+                                                 distinct_ * static_cast<double>(finite_));
+        whole_.decisions = std::move(decided.decisions);
+        result_.notes = std::move(decided.notes);
         result_.radius = whole_.decisions.radius;
         result_.spacing = whole_.decisions.spacing;
     }
@@ -249,7 +250,7 @@ class LargeCloud {
         }
         sample_ = {};
         const PointSet some{points, normals, {}, source_.z_up()};
-        CloudWork work(setup_, some, source_.scanner(), whole_.decisions);
+        CloudWork work = CloudWork::of_part(setup_, some, source_.scanner(), whole_.decisions);
         whole_.sides = work.settle_sides();
         whole_.normals_refused = work.normals_refused();
         recorded_ =
@@ -299,7 +300,7 @@ class LargeCloud {
         if (std::ranges::none_of(round.in_core, [](char core) { return core != 0; }))
             return values;
         const PointSet set{round.points, round.normals, {}, source_.z_up()};
-        CloudWork work(setup_, set, whole_);
+        CloudWork work = CloudWork::of_tile(setup_, set, whole_);
         CloudWork::TileResult found = work.run_tile(round.in_core);
         collect(values, round, found.values);
         for (std::size_t k = 0; k < found.sides_known.size(); ++k)
@@ -385,7 +386,7 @@ class LargeCloud {
                 options.normals = CloudNormals::recorded;
             const CloudSetup setup{options, nullptr, setup_.up, setup_.viewpoint};
             const PointSet set{kept.points, kept.normals, {}, source_.z_up()};
-            CloudWork some(setup, set, source_.scanner(), whole_.decisions);
+            CloudWork some = CloudWork::of_part(setup, set, source_.scanner(), whole_.decisions);
             const PointVisibility thinned = some.run();
             part.emplace(kept.points, whole, thinned.visibility, check_);
         }
