@@ -26,11 +26,19 @@ struct CloudErrorSigns {
     float side = recorded; ///< how sure its side is, 0 .. 1; 0 = unknown
     /// RMS error that the check on a part expects of its surroundings; NaN = nothing was checked.
     float repeat = std::numeric_limits<float>::quiet_NaN();
+    float back = 0; ///< BackShare::near; 0 where no noise was found
 };
 
-/// The squared error is the sum of two: of a point whose side is right, and of one whose side may be wrong.
+/// What the check needs of a point's signs, in two bytes.
+struct KeptSigns {
+    std::uint8_t side = 0, back = 0;
+};
+[[nodiscard]] KeptSigns kept(const CloudErrorSigns& signs);
+
+/// The squared error is the sum of three: of a point whose side is right, of one whose side may be wrong, and of layers
+/// that noise has left, which is the squared share of backs times 0.7^2.
 ///
-/// Each is a product, whose factors' binary logarithms are interpolated between knots. Knots lie at
+/// The first two are products, whose factors' binary logarithms are interpolated between knots. Knots lie at
 /// - visibility 0, 0.31, 0.56, 0.75, 0.89, 0.97, 1: evenly in 1 - sqrt(1 - visibility), as those of depth images do
 /// - sureness of the side at the same places, 0 .. 1
 /// - repeated errors of 0, 1/64, 3/64, 7/64, 15/64, 31/64
@@ -54,16 +62,18 @@ struct CloudErrorTables {
 [[nodiscard]] ErrorWeights unchecked_weights(const CloudErrorSigns& signs);
 [[nodiscard]] ErrorWeights turned_weights(const CloudErrorSigns& signs);
 
+/// What layers add to the square.
+[[nodiscard]] float layers_square(float back);
+
 /// RMS of visibility, 0 .. 1.
 [[nodiscard]] float expected_error(const CloudErrorSigns& signs, const CloudErrorTables& tables);
 
 /// The same in two steps, since the check comes last. The first one: what spans, folds and roughness say.
 [[nodiscard]] float factor_of_surroundings(const CloudErrorSigns& signs, const CloudErrorTables& tables);
-[[nodiscard]] float checked_error(float factor_of_surroundings, float visibility, float side, float repeat,
+[[nodiscard]] float checked_error(float factor_of_surroundings, const CloudErrorSigns& signs,
                                   const CloudErrorTables& tables);
 
-/// A side's sureness in one byte, and as it comes back.
-[[nodiscard]] std::uint8_t byte_of_side(float side);
+/// A side's sureness as it comes back from its byte.
 [[nodiscard]] float side_of(std::uint8_t byte);
 
 /// Lines of text: "made_by COMMAND", "checked number ...", "unchecked ...", "turned ...". Throws Error naming `origin`
@@ -73,8 +83,9 @@ struct CloudErrorTables {
 
 /// Those the program was built with.
 [[nodiscard]] const CloudErrorTables& shipped_cloud_errors();
-/// checked_error() with these tables and the side as byte_of_side() has it.
-[[nodiscard]] float error_once_checked(float factor_of_surroundings, float visibility, std::uint8_t side, float repeat);
+/// checked_error() with these tables.
+[[nodiscard]] float error_once_checked(float factor_of_surroundings, float visibility, const KeptSigns& kept,
+                                       float repeat);
 
 /// The RMS of errors; those that are NaN do not count.
 class ErrorSum {

@@ -12,6 +12,7 @@ namespace scanshade {
 /// What fitting did to the points of a tile, its rim included.
 struct FittedCounts {
     float noise = 0;
+    double same_facing = 0; ///< BackShare::same_facing, the largest of a tile
     std::uint64_t moved = 0, kept = 0, from = 0;
 };
 

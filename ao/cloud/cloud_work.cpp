@@ -1,6 +1,7 @@
 // Visibility of the points of a cloud or of a tile: neighbours, planes, sides, discs, rays, and means over neighbours.
 #include "ao/cloud/cloud_work.h"
 
+#include "ao/cloud/back_share.h"
 #include "ao/cloud/neighbour_means.h"
 #include "ao/cloud/repeatability.h"
 #include "projection/base/error.h"
@@ -193,7 +194,7 @@ CloudWork::TileResult CloudWork::run_tile(std::span<const char> in_core) {
     if (gpu_)
         for (const auto& [pass, ms] : gpu_->timings())
             result_.timings.emplace_back("on the device: " + pass, ms);
-    return {std::move(result_), std::move(sides_known_), fitted_, twins, gpu_tiles_ > 0};
+    return {std::move(result_), std::move(kept_signs_), fitted_, twins, gpu_tiles_ > 0};
 }
 
 void CloudWork::copy_to_twins() {
@@ -201,8 +202,8 @@ void CloudWork::copy_to_twins() {
         result_.visibility[point] = result_.visibility[same_as];
         result_.error[point] = result_.error[same_as];
         result_.normals[point] = result_.normals[same_as];
-        if (!sides_known_.empty())
-            sides_known_[point] = sides_known_[same_as];
+        if (!kept_signs_.empty())
+            kept_signs_[point] = kept_signs_[same_as];
     }
 }
 
@@ -235,7 +236,7 @@ void CloudWork::require_results() {
         tbb::parallel_invoke([&] { result_.visibility.assign(count, nothing); },
                              [&] { result_.error.assign(count, nothing); },
                              [&] { result_.normals.assign(count, Vector3f::Zero()); },
-                             [&] { sides_known_.assign(is_checked() ? count : 0, 0); },
+                             [&] { kept_signs_.assign(is_checked() ? count : 0, {}); },
                              [&] { signs_.resize(options_.keep_signs ? count : 0); });
 }
 
@@ -304,7 +305,7 @@ void CloudWork::compute_thinned() {
     tbb::parallel_for(std::size_t(0), result_.error.size(), [&](std::size_t i) {
         if (!std::isnan(result_.visibility[i]))
             result_.error[i] =
-                error_once_checked(result_.error[i], result_.visibility[i], sides_known_[i], found.error[i]);
+                error_once_checked(result_.error[i], result_.visibility[i], kept_signs_[i], found.error[i]);
     });
     for (std::size_t i = 0; i < signs_.size(); ++i)
         signs_[i].repeat = found.error[i];
@@ -359,9 +360,17 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
     for (const std::uint32_t index : lonely)
         surface.normals[index].setZero();
     watch_.lap("sides");
+    BackShare backs;
+    if (!fitted.empty()) {
+        if (!rays)
+            rays.emplace(surface);
+        backs = back_share(surface, *rays, reach());
+        fitted_.same_facing = backs.same_facing;
+        watch_.lap("backs");
+    }
     const Wanted wanted = wanted_of(core, round, fitted);
     const Untouched<float> values = visibility_of(surface, std::move(rays), wanted, gpu);
-    attach(planes, values, side_known, round, wanted);
+    attach(planes, values, side_known, backs.near, round, wanted);
     if (role_ == Role::cloud && fitted.empty()) {
         order_.resize(round.size());
         tbb::parallel_for(std::size_t(0), order_.size(),
@@ -426,14 +435,12 @@ Untouched<float> CloudWork::visibility_of(const CloudSurface& surface, std::opti
 
 /// Visibility, error and normal of each of the surface's points -> those points of the cloud that it stands for.
 void CloudWork::attach(const Fitted& planes, const Untouched<float>& values, const std::vector<float>& side_known,
-                       const Indices& round, const Wanted& wanted) {
+                       const std::vector<float>& backs, const Indices& round, const Wanted& wanted) {
     const CloudSurface& surface = planes.surface;
     const FittedCloud& fitted = planes.points;
     const float radius = reach();
     require_results();
     const CloudErrorTables& errors = shipped_cloud_errors();
-    constexpr float beyond_tables = 1.6F; // fitted to less noise: of kitchen and attic found / expected was 1.3 .. 2.2
-    const float of_slabs = fitted.largest_disc.empty() ? 1.0F : beyond_tables;
     const auto give = [&](std::size_t index, std::size_t point) {
         result_.visibility[point] = values[index];
         result_.normals[point] = surface.normals[index];
@@ -445,12 +452,12 @@ void CloudWork::attach(const Fitted& planes, const Untouched<float>& values, con
                                     .rough = surface.roughness[index] / radius,
                                     .side = side_known.empty() ? CloudErrorSigns::recorded
                                             : has_plane        ? side_known[index]
-                                                               : 0};
-        result_.error[point] = sides_known_.empty()
-                                   ? std::min(of_slabs * expected_error(signs, errors), 1.0F)
-                                   : factor_of_surroundings(signs, errors) + 2 * std::log2(of_slabs); // of the square
-        if (!sides_known_.empty())
-            sides_known_[point] = byte_of_side(signs.side);
+                                                               : 0,
+                                    .back = backs.empty() ? 0.0F : backs[index]};
+        result_.error[point] =
+            kept_signs_.empty() ? expected_error(signs, errors) : factor_of_surroundings(signs, errors);
+        if (!kept_signs_.empty())
+            kept_signs_[point] = kept(signs);
         if (!signs_.empty())
             signs_[point] = signs;
     };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/base/watch.h"
+#include "ao/cloud/back_share.h"
 #include "ao/cloud/chosen_points.h"
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/cloud_error.h"
@@ -95,7 +96,7 @@ class CloudWork {
 
     struct TileResult {
         PointVisibility values; ///< NaN for the rim. Errors of a cloud that is still to be checked are the first step's
-        std::vector<std::uint8_t> sides_known; ///< of such a cloud: for the second step, error_once_checked()
+        std::vector<KeptSigns> kept_signs; ///< of such a cloud: for the second step, error_once_checked()
         FittedCounts fitted;
         std::size_t twins = 0; ///< in the core
         bool on_gpu = false;
@@ -165,7 +166,7 @@ class CloudWork {
     [[nodiscard]] Untouched<float> visibility_of(const CloudSurface& surface, std::optional<DiscRays> rays,
                                                  const Wanted& wanted, CloudGpu* gpu);
     void attach(const Fitted& planes, const Untouched<float>& values, const std::vector<float>& side_known,
-                const Indices& round, const Wanted& wanted);
+                const std::vector<float>& backs, const Indices& round, const Wanted& wanted);
     [[nodiscard]] std::vector<float> sides_as_in_whole(CloudSurface& surface) const;
     void doubt_lines(const CloudSurface& surface);
     void doubt(const std::string& sentence);
@@ -181,8 +182,8 @@ class CloudWork {
     const OfWhole* whole_; ///< of a tile, else null
     CloudDecisions decided_;
     PointVisibility result_;
-    std::vector<std::uint8_t> sides_known_; ///< byte_of_side() of a cloud that is still to be checked; else empty
-    std::vector<CloudErrorSigns> signs_;    ///< only where asked for
+    std::vector<KeptSigns> kept_signs_;  ///< of a cloud that is still to be checked; else empty
+    std::vector<CloudErrorSigns> signs_; ///< only where asked for
     Watch watch_;
     std::optional<CloudGpu> gpu_;
     const RaysAndMeans rays_;

@@ -303,9 +303,9 @@ class LargeCloud {
         CloudWork work = CloudWork::of_tile(setup_, set, whole_);
         CloudWork::TileResult found = work.run_tile(round.in_core);
         collect(values, round, found.values);
-        for (std::size_t k = 0; k < found.sides_known.size(); ++k)
+        for (std::size_t k = 0; k < found.kept_signs.size(); ++k)
             if (round.in_core[k])
-                values.sides_known.push_back(found.sides_known[k]);
+                values.kept_signs.push_back(found.kept_signs[k]);
         values.twins = found.twins;
         values.moved = found.fitted.moved;
         values.discs = found.fitted.kept;
@@ -404,7 +404,7 @@ class LargeCloud {
                 for (std::size_t k = 0; k < values.error.size(); ++k)
                     if (!std::isnan(values.visibility[k]))
                         values.error[k] = error_once_checked(values.error[k], values.visibility[k],
-                                                             values.sides_known[k], repeated[k]);
+                                                             values.kept_signs[k], repeated[k]);
             }
             for (const float error : values.error)
                 sum.add(error);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/base/method.h"
+#include "ao/cloud/cloud_error.h"
 
 #include <cstdint>
 #include <Eigen/Core>
@@ -41,11 +42,11 @@ struct TilePoints {
 struct TileValues {
     std::vector<std::uint32_t> numbers;
     std::vector<float> visibility;
-    std::vector<float> error;              ///< expected; until `checked` what CloudWork::TileResult has
-    std::vector<std::uint8_t> sides_known; ///< likewise; empty where nothing is to be checked
-    std::vector<std::uint32_t> shown;      ///< places in `numbers`: those points whose normals are kept
-    std::vector<Eigen::Vector3f> normals;  ///< of these
-    bool checked = false;                  ///< errors have what the check found
+    std::vector<float> error;             ///< expected; until `checked` what CloudWork::TileResult has
+    std::vector<KeptSigns> kept_signs;    ///< likewise; empty where nothing is to be checked
+    std::vector<std::uint32_t> shown;     ///< places in `numbers`: those points whose normals are kept
+    std::vector<Eigen::Vector3f> normals; ///< of these
+    bool checked = false;                 ///< errors have what the check found
     // For the notes.
     std::uint64_t round = 0, twins = 0, moved = 0, discs = 0, fitted_from = 0;
     float noise = 0;

@@ -27,8 +27,8 @@ namespace {
 using Eigen::Vector3d, Eigen::Vector3f;
 
 constexpr std::uint32_t in_rim = 0x80000000U; ///< of a record's number; readers have fewer points
-constexpr std::string_view index_words = "scanshade tiles 2\n", values_words = "tile values 2\n\0\0";
-constexpr std::size_t value_bytes = 13, shown_bytes = 16;
+constexpr std::string_view index_words = "scanshade tiles 2\n", values_words = "tile values 3\n\0\0";
+constexpr std::size_t value_bytes = 14, shown_bytes = 16;
 
 template <class Number>
 void put(std::string& bytes, Number value) {
@@ -285,7 +285,7 @@ void TilesOnDisk::keep(std::size_t tile, TileValues values) {
         put(bytes, values.numbers[k]);
         put(bytes, values.visibility[k]);
         put(bytes, values.error[k]);
-        put(bytes, values.sides_known.empty() ? std::uint8_t{0} : values.sides_known[k]);
+        put(bytes, values.kept_signs.empty() ? KeptSigns() : values.kept_signs[k]);
     }
     write_atomically(values_file(tile), bytes);
 }
@@ -328,7 +328,7 @@ std::optional<TileValues> TilesOnDisk::values(std::size_t tile) {
         values.numbers.push_back(load<std::uint32_t>(from));
         values.visibility.push_back(load<float>(from + 4));
         values.error.push_back(load<float>(from + 8));
-        values.sides_known.push_back(load<std::uint8_t>(from + 12));
+        values.kept_signs.push_back(load<KeptSigns>(from + 12));
     }
     values.round = head.round, values.twins = head.twins, values.moved = head.moved, values.discs = head.discs;
     values.fitted_from = head.fitted_from, values.noise = head.noise;

@@ -112,21 +112,33 @@ TEST(CloudErrors, damaged_tables_name_the_line) {
     EXPECT_TRUE(says(complaint("turned nan\n"), "numbers expected"));
 }
 
-/// The check comes last, so that the error is found in two steps; a side waits in one byte.
+TEST(CloudErrors, layers_that_noise_left_add_to_the_square) {
+    cv::RNG random(3);
+    for (int i = 0; i < 100; ++i) {
+        CloudErrorSigns signs = some_signs(random);
+        const float without = expected_error(signs, shipped_cloud_errors());
+        signs.back = random.uniform(0.0F, 1.0F);
+        const float square = std::min(without * without + 0.49F * signs.back * signs.back, 1.0F);
+        EXPECT_NEAR(expected_error(signs, shipped_cloud_errors()), std::sqrt(square), 1e-5);
+    }
+}
+
+/// The check comes last, so that the error is found in two steps; sides and backs wait in a byte each.
 TEST(CloudErrors, two_steps_find_what_one_does) {
     cv::RNG random(7);
     for (int i = 0; i < 1000; ++i) {
         CloudErrorSigns signs = some_signs(random);
         signs.repeat = random.uniform(0.0F, 0.6F);
+        signs.back = random.uniform(0.0F, 1.0F);
         const CloudErrorTables& tables = shipped_cloud_errors();
         const float at_once = expected_error(signs, tables);
-        const float later = checked_error(factor_of_surroundings(signs, tables), signs.visibility,
-                                          side_of(byte_of_side(signs.side)), signs.repeat, tables);
+        const float later =
+            error_once_checked(factor_of_surroundings(signs, tables), signs.visibility, kept(signs), signs.repeat);
         ASSERT_NEAR(later, at_once, 0.003);
     }
-    EXPECT_EQ(side_of(byte_of_side(CloudErrorSigns::recorded)), CloudErrorSigns::recorded);
-    EXPECT_EQ(side_of(byte_of_side(0)), 0);
-    EXPECT_EQ(side_of(byte_of_side(1)), 1);
+    EXPECT_EQ(side_of(kept({}).side), CloudErrorSigns::recorded);
+    EXPECT_EQ(side_of(kept({.side = 0}).side), 0);
+    EXPECT_EQ(side_of(kept({.side = 1}).side), 1);
 }
 
 TEST(CloudErrors, errors_are_numbers_whatever_the_signs) {

@@ -68,7 +68,8 @@ CloudErrorTables fitted_cloud_errors(std::span<const CloudErrorSample> samples, 
         if (sample.scene == without)
             continue;
         const auto square = static_cast<double>(sample.square);
-        const double upright = sample.turned ? 0 : square; // the rest is the turned table's
+        const double layers = layers_square(sample.signs.back);
+        const double upright = sample.turned ? 0 : std::max(square - layers, 0.0); // the rest is the turned table's
         if (!std::isnan(sample.signs.repeat))
             checked.push_back({checked_weights(sample.signs), upright});
         unchecked.push_back({unchecked_weights(sample.signs), upright});

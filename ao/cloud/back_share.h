@@ -1,0 +1,21 @@
+// Backs that rays from fronts meet first: where noise or wrong sides have left layers that free space does not have.
+#pragma once
+
+#include "ao/cloud/surface/disc_rays.h"
+
+#include <vector>
+
+namespace scanshade {
+
+/// Cosine-weighted rays that leave the front of a surface meet fronts or nothing, but behind sheets that were seen from
+/// one side only. What noise has left of a surface is layers, whose backs they meet.
+struct BackShare {
+    /// By index in the tree: of rays near by, the share that meets a back within the radius.
+    std::vector<float> near;
+    /// Of all rays, the share that meets a back which faces like the start (cosine > 0.7): its own surface, once more.
+    double same_facing = 0;
+};
+/// From a point of each leaf, which has a normal. Deterministic.
+[[nodiscard]] BackShare back_share(const CloudSurface& surface, const DiscRays& rays, float radius);
+
+} // namespace scanshade
