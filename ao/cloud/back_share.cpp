@@ -5,29 +5,27 @@
 
 namespace scanshade {
 
-BackShare back_share(const CloudSurface& surface, const DiscRays& rays, float radius) {
-    constexpr std::size_t runs = 3;                    // of eight rays
-    constexpr std::size_t together = 6;                // leaves, whose rays make one share
-    constexpr float least_facing = 0.1F, alike = 0.7F; // grazing hits say nothing
+BackShare back_share(const CloudSurface& surface, const DiscRays& rays, float radius, std::size_t most_leaves) {
+    constexpr std::size_t runs = 3;      // of eight rays
+    constexpr std::size_t together = 6;  // leaves, whose rays make one share
+    constexpr float least_facing = 0.1F; // grazing hits say nothing
     const DirectionSet directions(DiscRays::together, 0);
-    const std::size_t leaves = surface.tree.leaves();
+    const std::size_t leaves = surface.tree.leaves(), every = (leaves - 1) / std::min(most_leaves, leaves) + 1;
     struct Counts {
-        int cast = 0, back = 0, same = 0;
+        int cast = 0, back = 0;
     };
     std::vector<Counts> of(leaves);
     tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) {
         const auto [begin, end] = surface.tree.leaf_range(leaf);
         const std::size_t index = begin + (end - begin) / 2;
-        if (begin == end || surface.normals[index].isZero() || !(surface.disc_radius[index] > 0))
+        if (begin == end || leaf % every != 0 || surface.normals[index].isZero() || !(surface.disc_radius[index] > 0))
             return;
         const Eigen::Vector3f& normal = surface.normals[index];
         for (std::size_t run = 0; run < runs; ++run) {
             const DiscRays::Hits hits = rays.first_hits(index, normal, directions.run(runs * leaf + run));
             for (std::size_t i = 0; i < DiscRays::together; ++i) {
-                const bool back = hits.distance[i] <= radius && hits.facing[i] < -least_facing;
                 ++of[leaf].cast;
-                of[leaf].back += back;
-                of[leaf].same += back && surface.normals[hits.index[i]].dot(normal) > alike;
+                of[leaf].back += hits.distance[i] <= radius && hits.facing[i] < -least_facing;
             }
         }
     });
@@ -40,16 +38,15 @@ BackShare back_share(const CloudSurface& surface, const DiscRays& rays, float ra
         for (std::size_t leaf = first; leaf < last; ++leaf) {
             some.cast += of[leaf].cast;
             some.back += of[leaf].back;
-            some.same += of[leaf].same;
         }
         all.cast += some.cast;
-        all.same += some.same;
+        all.back += some.back;
         const std::size_t begin = surface.tree.leaf_range(first).first, end = surface.tree.leaf_range(last - 1).second;
         std::fill(found.near.begin() + static_cast<std::ptrdiff_t>(begin),
                   found.near.begin() + static_cast<std::ptrdiff_t>(end),
                   some.cast > 0 ? static_cast<float>(some.back) / static_cast<float>(some.cast) : 0.0F);
     }
-    found.same_facing = all.cast > 0 ? static_cast<double>(all.same) / all.cast : 0;
+    found.mean = all.cast > 0 ? static_cast<double>(all.back) / all.cast : 0;
     return found;
 }
 

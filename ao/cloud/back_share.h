@@ -3,6 +3,8 @@
 
 #include "ao/cloud/surface/disc_rays.h"
 
+#include <cstddef>
+#include <limits>
 #include <vector>
 
 namespace scanshade {
@@ -12,10 +14,10 @@ namespace scanshade {
 struct BackShare {
     /// By index in the tree: of rays near by, the share that meets a back within the radius.
     std::vector<float> near;
-    /// Of all rays, the share that meets a back which faces like the start (cosine > 0.7): its own surface, once more.
-    double same_facing = 0;
+    double mean = 0; ///< of all rays
 };
-/// From a point of each leaf, which has a normal. Deterministic.
-[[nodiscard]] BackShare back_share(const CloudSurface& surface, const DiscRays& rays, float radius);
+/// From a point of each leaf, which has a normal, or of `most_leaves` of them. Deterministic.
+[[nodiscard]] BackShare back_share(const CloudSurface& surface, const DiscRays& rays, float radius,
+                                   std::size_t most_leaves = std::numeric_limits<std::size_t>::max());
 
 } // namespace scanshade

@@ -12,7 +12,7 @@ namespace scanshade {
 /// What fitting did to the points of a tile, its rim included.
 struct FittedCounts {
     float noise = 0;
-    double same_facing = 0; ///< BackShare::same_facing, the largest of a tile
+    double backs = 0; ///< BackShare::mean
     std::uint64_t moved = 0, kept = 0, from = 0;
 };
 
@@ -20,6 +20,9 @@ struct FittedCounts {
 [[nodiscard]] std::string told_sides(const SettledSides& sides, bool recorded);
 /// The same about noise; none where no point was moved.
 [[nodiscard]] std::optional<std::string> told_noise(const FittedCounts& fitted);
+
+/// A doubt where noise was left in layers.
+[[nodiscard]] std::optional<std::string> doubted_noise(const FittedCounts& fitted);
 
 /// Sentences about the expected error of a cloud, and a doubt where its check alone lets expect a very large one. A
 /// large expected error is a property of the result, not a doubt.

@@ -361,11 +361,16 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
         surface.normals[index].setZero();
     watch_.lap("sides");
     BackShare backs;
-    if (!fitted.empty()) {
+    constexpr double noise_is_told = 76; // spacings; see look_for_noise()
+    constexpr std::size_t some = 2000;
+    const bool by_radius = role_ == Role::cloud && result_.radius < noise_is_told * result_.spacing;
+    if (!fitted.empty() || by_radius) {
         if (!rays)
             rays.emplace(surface);
-        backs = back_share(surface, *rays, reach());
-        fitted_.same_facing = backs.same_facing;
+        backs = fitted.empty() ? back_share(surface, *rays, reach(), some) : back_share(surface, *rays, reach());
+        if (fitted.empty())
+            backs.near.clear();
+        fitted_.backs = std::max(fitted_.backs, backs.mean);
         watch_.lap("backs");
     }
     const Wanted wanted = wanted_of(core, round, fitted);
@@ -601,6 +606,8 @@ bool CloudWork::recorded() const {
 }
 
 void CloudWork::tell() {
+    if (const auto left = doubted_noise(fitted_))
+        doubt(*left);
     if (const auto told = told_noise(fitted_))
         result_.notes.push_back(*told);
     result_.notes.push_back(told_sides(sides_, recorded()));

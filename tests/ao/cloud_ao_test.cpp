@@ -512,6 +512,21 @@ TEST(CloudAo, run_writes_the_error_that_confidence_follows_from) {
         << "that of the cloud is the mean of its points'";
 }
 
+/// Balls up to half the radius tell noise, and have to be five times as wide as it.
+TEST(CloudAo, noise_that_the_radius_is_too_small_to_tell_is_doubted) {
+    const Points slab = square(60000, 0.02), up(slab.size(), Vector3d::UnitZ()); // 8 mm apart
+    const auto left = [&](double radius) {
+        const auto found = visibility(slab, {.radius = radius}, up);
+        return std::ranges::any_of(found.doubts, [](const std::string& doubt) {
+            return doubt.find("larger than the spacing of the points is left") != doubt.npos;
+        });
+    };
+    EXPECT_TRUE(left(0.08));
+    EXPECT_FALSE(left(0.5)) << "as the doubt advises";
+    const auto exact = visibility(square(60000), {.radius = 0.08}, up);
+    EXPECT_TRUE(exact.doubts.empty()) << tests::joined(exact.doubts);
+}
+
 TEST(CloudAo, rings_of_a_spinning_lidar_are_doubted) {
     Points rings, even;
     for (int laser = 0; laser < 16; ++laser) { // on a floor 2 m below, and the walls of a street
