@@ -21,7 +21,7 @@ void CloudFiles::pass(const Visit& visit) {
     for (std::size_t k = 0; k < files_.size(); ++k) {
         const auto fields = normal_fields(files_[k].records());
         Told told;
-        unsigned colour_step = 0;
+        double colour_step = 0;
         const std::size_t step = MapCounts::step(size());
         files_[k].pass([&](std::size_t first, const CloudRecords& block) {
             const std::vector<Vector3d> points = points_of(block, told.odd);

@@ -24,8 +24,8 @@ void warn_of(const PointOddities& odd, const std::filesystem::path& file, std::v
 
 /// BGR; empty where there are none.
 [[nodiscard]] std::vector<cv::Vec3b> colours_of(const CloudRecords& records);
-/// Of LAS: the divisor of its colours, as these records tell it; 0 for other formats and files without colour.
-[[nodiscard]] unsigned colour_step_of(const CloudRecords& records);
+/// The divisor of colours in three fields, as these records tell it; 0 where there are none.
+[[nodiscard]] double colour_step_of(const CloudRecords& records);
 
 /// The fields of recorded normals: nx ny nz, or normal_x ...
 [[nodiscard]] std::optional<std::array<std::size_t, 3>> normal_fields(const CloudRecords& records);

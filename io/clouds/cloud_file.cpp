@@ -73,7 +73,7 @@ void place_coordinate(const CloudRecords& records, const char* name, int axis, s
 class LeftOut {
   public:
     explicit LeftOut(const CloudRecords& records) : records_(records) {
-        if (!records.format || !records.format->wide_colours || records.stride == 0) // as las_colours() tells LAS
+        if (!records.format || !records.format->wide_colours || records.stride == 0) // LAS and LAZ have wide ones
             return;
         classification_ = records.field_named("classification");
         if (records.field_named("return_numbers")) // formats 6 to 10, where flags are beside the class
@@ -145,41 +145,31 @@ cv::Vec3b bgr_of(std::uint32_t bits) {
     return {static_cast<uchar>(bits), static_cast<uchar>(bits >> 8), static_cast<uchar>(bits >> 16)};
 }
 
-/// The divisor of colour values: LAS has 16 bits per channel, but many writers store 8-bit values in them.
-unsigned las_colour_step(const CloudRecords& records, const std::array<std::size_t, 3>& bgr) {
+/// What colours are divided by to be bytes. LAS has 16 bits per channel, but many writers store 8-bit values in them;
+/// other files have 8 or 16 bits, or fractions of 1.
+double colour_step_in(const CloudRecords& records, const std::array<std::size_t, 3>& bgr) {
     if (records.colour_step > 0)
         return records.colour_step;
+    if (records.fields[bgr[0]].type == Scalar::uint8 && !records.text())
+        return 1;
+    double largest = 0; // NaN is smaller
     for (std::size_t i = 0; i < records.point_count; ++i)
         for (const std::size_t channel : bgr)
-            if (value_at(records, records.record(i), channel) > 255)
-                return 256;
-    return 1;
-}
-
-std::optional<std::array<std::size_t, 3>> las_colours(const CloudRecords& records) {
-    const auto blue = records.field_named("blue"), green = records.field_named("green"),
-               red = records.field_named("red");
-    if (!records.format->wide_colours || !blue || !green || !red)
-        return std::nullopt;
-    return std::array{*blue, *green, *red};
+            largest = std::max(largest, value_at(records, records.record(i), channel));
+    const Scalar type = records.fields[bgr[0]].type;
+    if ((type == Scalar::float32 || type == Scalar::float64) && largest > 0 && largest <= 1)
+        return 1 / 255.0;
+    return largest <= 255 ? 1 : records.format->wide_colours ? 256 : 257;
 }
 
 } // namespace
 
 std::vector<cv::Vec3b> colours_of(const CloudRecords& records) {
-    if (const auto bgr = las_colours(records)) {
-        const double step = las_colour_step(records, *bgr);
-        std::vector<cv::Vec3b> colours(records.point_count);
-        for (std::size_t i = 0; i < colours.size(); ++i)
-            for (std::size_t channel = 0; channel < 3; ++channel)
-                colours[i][static_cast<int>(channel)] =
-                    static_cast<uchar>(value_at(records, records.record(i), (*bgr)[channel]) / step);
-        return colours;
-    }
     const ColourFields fields = colour_fields(records);
     std::vector<cv::Vec3b> colours;
     if (!fields.packed && !fields.bgr)
         return colours;
+    const double step = fields.packed ? 1 : colour_step_in(records, *fields.bgr);
     colours.reserve(records.point_count);
     for (std::size_t i = 0; i < records.point_count; ++i) {
         const std::string_view record = records.record(i);
@@ -188,9 +178,10 @@ std::vector<cv::Vec3b> colours_of(const CloudRecords& records) {
             continue;
         }
         cv::Vec3b colour;
-        for (std::size_t channel = 0; channel < 3; ++channel)
-            colour[static_cast<int>(channel)] =
-                cv::saturate_cast<uchar>(value_at(records, record, (*fields.bgr)[channel]));
+        for (std::size_t channel = 0; channel < 3; ++channel) {
+            const double value = value_at(records, record, (*fields.bgr)[channel]) / step;
+            colour[static_cast<int>(channel)] = cv::saturate_cast<uchar>(step == 256 ? std::floor(value) : value);
+        }
         colours.push_back(colour);
     }
     return colours;
@@ -240,21 +231,17 @@ void replace_colours(const CloudRecords& records, std::span<const cv::Vec3b> col
                  const auto bits = alpha | std::uint32_t(c[2]) << 16 | std::uint32_t(c[1]) << 8 | c[0];
                  return encoded_bits(records, records.fields[field].type, bits);
              }});
-    } else if (const auto wide = las_colours(records)) {
-        const double step = las_colour_step(records, *wide) == 256 ? 257 : 1; // 255 is 65535 then
-        for (int channel = 0; channel < 3; ++channel)
-            replacements.push_back({(*wide)[static_cast<std::size_t>(channel)],
-                                    [&records, colours, channel, step](std::size_t point, std::string_view) {
-                                        return encoded(records, Scalar::uint16, step * colours[point][channel]);
-                                    }});
     } else if (fields.bgr) {
-        for (int channel = 0; channel < 3; ++channel)
-            replacements.push_back({(*fields.bgr)[static_cast<std::size_t>(channel)],
-                                    [&records, colours, channel](std::size_t point, std::string_view) {
-                                        return encoded(records, Scalar::uint8, colours[point][channel]);
+        const double step = colour_step_in(records, *fields.bgr), full = step == 256 ? 257 : step; // 255 is 65535 then
+        for (int channel = 0; channel < 3; ++channel) {
+            const std::size_t field = (*fields.bgr)[static_cast<std::size_t>(channel)];
+            replacements.push_back({field, [&records, colours, channel, full,
+                                            type = records.fields[field].type](std::size_t point, std::string_view) {
+                                        return encoded(records, type, full * colours[point][channel]);
                                     }});
+        }
     } else {
-        throw Error("the cloud has no colour field to replace (rgb, rgba, or red green blue as uchar)");
+        throw Error("the cloud has no colour field to replace (rgb, rgba, or red green blue)");
     }
 }
 
@@ -276,7 +263,7 @@ std::vector<FieldAddition> new_colour_fields(const CloudRecords& records, std::s
 
 bool has_colour_fields(const CloudRecords& records) {
     const ColourFields fields = colour_fields(records);
-    return fields.packed || fields.bgr || las_colours(records);
+    return fields.packed || fields.bgr;
 }
 
 } // namespace
@@ -299,10 +286,34 @@ CloudEdit edit_of(const CloudRecords& records, const std::vector<AddedField>& ad
     return edit;
 }
 
-unsigned colour_step_of(const CloudRecords& records) {
-    const auto bgr = las_colours(records);
-    return bgr ? las_colour_step(records, *bgr) : 0;
+double colour_step_of(const CloudRecords& records) {
+    const ColourFields fields = colour_fields(records);
+    return fields.bgr && !fields.packed ? colour_step_in(records, *fields.bgr) : 0;
 }
+
+namespace {
+
+/// Says how colours were taken where the file does not, and which are not used.
+void warn_of_colours(const CloudRecords& records, const fs::path& file, std::vector<std::string>& warnings) {
+    const double step = records.colour_step;
+    if (step > 0 && step < 1)
+        warnings.push_back(file.string() + ": colours are at most 1: taken as fractions.");
+    else if (step == 257)
+        warnings.push_back(file.string() + ": colours above 255: taken as numbers of 16 bits.");
+    if (step > 0 || has_colour_fields(records))
+        return;
+    constexpr std::array<std::string_view, 5> names{"red", "green", "blue", "rgb", "rgba"};
+    for (const CloudField& field : records.fields)
+        if (std::ranges::any_of(names, [&](std::string_view name) { return is_named(field, name); })) {
+            warnings.push_back(
+                fmt::format("{}: the field {} is not used as a colour: expected red, green and blue, or rgb "
+                            "of 4 bytes.",
+                            file.string(), in_quotes(field.name)));
+            return;
+        }
+}
+
+} // namespace
 
 namespace {
 
@@ -321,6 +332,8 @@ Cloud read_cloud(const fs::path& file, std::vector<std::string>& warnings) {
     PointOddities odd;
     cloud.points = points_of(*records, odd);
     warn_of(odd, file, warnings);
+    records->colour_step = colour_step_of(*records);
+    warn_of_colours(*records, file, warnings);
     cloud.colours = colours_of(*records);
     cloud.records = std::move(records);
     return cloud;

@@ -48,6 +48,9 @@ std::optional<std::size_t> CloudRecords::field_named(std::string_view name) cons
     for (std::size_t i = 0; i < fields.size(); ++i)
         if (fields[i].name == name && !fields[i].list_length)
             return i;
+    for (std::size_t i = 0; i < fields.size(); ++i)
+        if (is_named(fields[i], name) && !fields[i].list_length)
+            return i;
     return std::nullopt;
 }
 
@@ -181,6 +184,12 @@ std::string encoded(const CloudRecords& records, Scalar type, double value) {
     });
 }
 
+bool is_named(const CloudField& field, std::string_view name) {
+    return std::ranges::equal(
+        field.name, name, {}, [](unsigned char c) { return std::tolower(c); },
+        [](unsigned char c) { return std::tolower(c); });
+}
+
 ColourFields colour_fields(const CloudRecords& records) {
     ColourFields found;
     for (const auto* name : {"rgba", "rgb"}) {
@@ -191,16 +200,16 @@ ColourFields colour_fields(const CloudRecords& records) {
         if (f.count == 1 && !f.list_length && size_of(f.type) == 4)
             found.packed = field;
     }
-    for (const std::string prefix : {"diffuse_", ""}) {
-        const auto blue = records.field_named(prefix + "blue"), green = records.field_named(prefix + "green"),
-                   red = records.field_named(prefix + "red");
-        if (!blue || !green || !red)
-            continue;
-        const auto one_byte = [&](std::size_t i) {
-            return records.fields[i].type == Scalar::uint8 && records.fields[i].count == 1 &&
-                   !records.fields[i].list_length;
+    constexpr std::array<std::array<const char*, 3>, 4> names{{{"diffuse_blue", "diffuse_green", "diffuse_red"},
+                                                               {"blue", "green", "red"},
+                                                               {"b", "g", "r"},
+                                                               {"bf", "gf", "rf"}}}; // fractions, CloudCompare
+    for (const auto& [b, g, r] : names) {
+        const auto blue = records.field_named(b), green = records.field_named(g), red = records.field_named(r);
+        const auto is_number = [&](const std::optional<std::size_t>& i) {
+            return i && records.fields[*i].count == 1 && !records.fields[*i].list_length;
         };
-        if (one_byte(*blue) && one_byte(*green) && one_byte(*red))
+        if (is_number(blue) && is_number(green) && is_number(red))
             found.bgr = {*blue, *green, *red};
     }
     return found;

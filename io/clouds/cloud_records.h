@@ -36,6 +36,9 @@ struct CloudField {
     [[nodiscard]] std::size_t bytes() const { return size_of(type) * count; }
 };
 
+/// Whatever the case of its letters.
+[[nodiscard]] bool is_named(const CloudField& field, std::string_view name);
+
 /// The file, taken apart but not changed: header, before, points, after in this order are its bytes (the
 /// compressed points of PCD and LAZ are unpacked and put point after point).
 struct CloudRecords {
@@ -58,14 +61,15 @@ struct CloudRecords {
     std::string after; ///< faces, other elements, left-over lines
     std::array<double, 3> scale{1, 1, 1}, shift{0, 0, 0}; ///< coordinates are field values times scale plus shift
     std::vector<Eigen::Vector3d> placed;                  ///< the points, if fields alone do not give them
-    std::string unit;         ///< of the coordinates, and its source; empty: metres, by convention
-    unsigned colour_step = 0; ///< LAS: the divisor of colours, where these are a part of the file; 0 = they tell it
+    std::string unit;       ///< of the coordinates, and its source; empty: metres, by convention
+    double colour_step = 0; ///< the divisor of colours, where these are a part of the file; 0 = they tell it
     std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera, if the PCD has one
 
     [[nodiscard]] bool text() const { return encoding == Encoding::ascii; }
     /// Point `index`'s bytes; for text what lies between the last word before it and its own last word.
     [[nodiscard]] std::string_view record(std::size_t index) const;
-    /// The first field of that name that is not a list, because a list may be empty.
+    /// The first field of that name that is not a list, because a list may be empty. Capitals count only where there
+    /// are several.
     [[nodiscard]] std::optional<std::size_t> field_named(std::string_view name) const;
 };
 
@@ -82,10 +86,10 @@ struct FieldPlace {
 /// A number of `type` at `from`, which must have that many bytes.
 [[nodiscard]] double decoded(const char* from, Scalar type, bool big_endian);
 
-/// Fields that hold colour: one 4-byte field of packed bits, or three bytes.
+/// Fields that hold colour: one 4-byte field of packed bits, or three numbers.
 struct ColourFields {
-    std::optional<std::size_t> packed; ///< 0xAARRGGBB, typed float or integer
-    std::optional<std::array<std::size_t, 3>> bgr;
+    std::optional<std::size_t> packed;             ///< 0xAARRGGBB, typed float or integer
+    std::optional<std::array<std::size_t, 3>> bgr; ///< divided by colour_step_of() they are 0 .. 255
 };
 [[nodiscard]] ColourFields colour_fields(const CloudRecords& records);
 /// The packed colour's bits. Floats are read as bits, never as numbers: many are NaN or denormal.

@@ -47,8 +47,8 @@ class CloudStream {
     void write(const std::filesystem::path& target, const std::vector<std::string>& names,
                const std::function<BlockValues(std::size_t first, const CloudRecords& block)>& values) const;
 
-    /// LAS: the divisor of colours, found by colour_step_of() in all blocks; they have it from then on.
-    void set_colour_step(unsigned step) { shape_.records.colour_step = step; }
+    /// The divisor of colours, the largest that colour_step_of() finds in the blocks; they have it from then on.
+    void set_colour_step(double step) { shape_.records.colour_step = step; }
 
   private:
     [[nodiscard]] CloudRecords empty_block() const;

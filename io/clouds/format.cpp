@@ -12,7 +12,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_ply(std::string_view start) { return start.starts_with("ply\n") || start.starts_with("ply\r"); }
+/// Its first line is "ply", however it ends.
+bool is_ply(std::string_view start) {
+    return start.starts_with("ply") && trimmed(start.substr(0, start.find_first_of("\r\n"))) == "ply" &&
+           start.find_first_of("\r\n") != std::string_view::npos;
+}
 bool is_las(std::string_view start) { return start.starts_with("LASF"); }
 /// A LAS file whose point format has the bit of compression.
 bool is_laz(std::string_view start) {

@@ -123,9 +123,9 @@ std::vector<CloudField> fields_of(const PcdHeader& header, const fs::path& file,
         fields[i].name = names.values[i];
         fields[i].type = scalar_of(count_in(sizes, "SIZE", i, file), types.values[i], file, sizes, types);
         const std::uint64_t count = counts ? count_in(*counts, "COUNT", i, file) : 1;
-        if (count == 0 || count > widest_point)
+        if (count > widest_point) // 0: padding of no bytes, as drivers of lidars write it
             throw Error(
-                fmt::format("{}: COUNT {}, expected 1 .. {}", at_line(file, counts->number), count, widest_point));
+                fmt::format("{}: COUNT {}, expected 0 .. {}", at_line(file, counts->number), count, widest_point));
         fields[i].count = count;
         fields[i].offset = stride;
         stride += fields[i].bytes();
@@ -133,8 +133,8 @@ std::vector<CloudField> fields_of(const PcdHeader& header, const fs::path& file,
             throw Error(fmt::format("{}: a point takes more than {} bytes", file.string(), widest_point));
     }
     for (const auto* name : {"x", "y", "z"}) {
-        const auto found =
-            std::find_if(fields.begin(), fields.end(), [&](const CloudField& f) { return f.name == name; });
+        const auto found = std::find_if(fields.begin(), fields.end(),
+                                        [&](const CloudField& f) { return is_named(f, name) && f.count > 0; });
         if (found == fields.end())
             throw Error(fmt::format("{}: no field {} among {}", at_line(file, names.number), name,
                                     fmt::join(names.values, " ")));

@@ -106,14 +106,22 @@ CloudField property_of(const std::vector<std::string_view>& line, const fs::path
     return property;
 }
 
+/// How the header's lines end, as its first one tells: LF, also behind CR; CR alone; LF CR.
+std::string_view line_end_of(std::string_view bytes) {
+    const std::size_t at = bytes.find_first_of("\r\n");
+    const std::string_view rest = at == std::string_view::npos ? std::string_view() : bytes.substr(at);
+    return rest.starts_with("\n\r") ? "\n\r" : rest.starts_with('\r') && !rest.starts_with("\r\n") ? "\r" : "\n";
+}
+
 PlyHeader parse_header(std::string_view bytes, const fs::path& file) {
     PlyHeader header;
+    const std::string_view line_end = line_end_of(bytes);
     bool format_seen = false;
     int number = 0;
     for (std::size_t at = 0; at < std::min(bytes.size(), longest_ply_header);) {
-        const std::size_t end = std::min(bytes.find('\n', at), bytes.size());
+        const std::size_t end = std::min(bytes.find(line_end, at), bytes.size());
         const auto line = words(bytes.substr(at, end - at));
-        at = std::min(end + 1, bytes.size());
+        at = std::min(end + line_end.size(), bytes.size());
         ++number;
         const std::string_view key = line.empty() ? std::string_view() : line[0];
         if (number == 1 || key.empty() || key == "comment")
@@ -363,7 +371,7 @@ const Element& vertex_element(const PlyHeader& header, const fs::path& file) {
         throw Error(file.string() + ": no element vertex in the header");
     for (const auto* name : {"x", "y", "z"}) {
         const bool there = std::any_of(vertex->properties.begin(), vertex->properties.end(),
-                                       [&](const CloudField& p) { return p.name == name && !p.list_length; });
+                                       [&](const CloudField& p) { return is_named(p, name) && !p.list_length; });
         if (!there)
             throw Error(fmt::format("{}: element vertex has no property {}", at_line(file, vertex->line), name));
     }
@@ -497,7 +505,8 @@ std::string ply_bytes(const CloudRecords& records, std::string points, const std
     std::string header = records.header;
     const PlyHeader parsed = parse_header(header, "cloud");
     const Element& vertex = vertex_element(parsed, "cloud");
-    const std::string line_end = header.substr(0, vertex.properties_end).ends_with("\r\n") ? "\r\n" : "\n";
+    const std::string line_end(header.substr(0, vertex.properties_end).ends_with("\r\n") ? "\r\n"
+                                                                                         : line_end_of(header));
     std::string lines;
     for (const FieldAddition& addition : additions)
         lines += (addition.type == Scalar::uint8 ? "property uchar " : "property float ") + addition.name + line_end;

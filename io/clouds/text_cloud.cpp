@@ -13,12 +13,15 @@
 #include <fmt/ranges.h>
 #include <limits>
 #include <optional>
+#include <utility>
 
 namespace scanshade {
 
 namespace fs = std::filesystem;
 
 namespace {
+
+constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
 /// What three columns beside each other hold.
 enum class Triple { colours, normals, other };
@@ -37,8 +40,9 @@ Triple triple_in(const std::vector<std::vector<double>>& lines, std::size_t firs
 }
 
 /// The columns of lines without names: x y z, then colours and normals as their values tell, and an intensity before or
-/// one more value behind them. `lines` are the first ones, equally long.
-std::vector<std::string> usual_names(const std::vector<std::vector<double>>& lines) {
+/// one more value behind them. `lines` are the first ones, equally long. `colours_first`: of seven columns, the fourth
+/// to the sixth are colours.
+std::vector<std::string> usual_names(const std::vector<std::vector<double>>& lines, bool colours_first) {
     const std::size_t columns = lines.empty() ? 3 : lines.front().size();
     std::vector<std::string> names{"x", "y", "z"};
     const auto take_triples = [&](std::size_t end) { // false where one of them is neither
@@ -55,7 +59,9 @@ std::vector<std::string> usual_names(const std::vector<std::vector<double>>& lin
         return true;
     };
     constexpr std::size_t most_usual = 10;
-    if (columns > 3 && columns <= most_usual && columns % 3 == 1) {
+    if (columns == 7 && colours_first) {
+        names.insert(names.end(), {"red", "green", "blue"});
+    } else if (columns > 3 && columns <= most_usual && columns % 3 == 1) {
         names.emplace_back("intensity");
         if (!take_triples(columns)) {
             names.resize(3);
@@ -102,10 +108,8 @@ std::vector<std::string> ptx_names(std::size_t columns) {
 
 std::vector<CloudField> fields_named(const std::vector<std::string>& names) {
     std::vector<CloudField> fields;
-    for (const std::string& name : names) {
-        const bool colour = name == "red" || name == "green" || name == "blue";
-        fields.push_back({name, colour ? Scalar::uint8 : Scalar::float64, 1, std::nullopt, 0});
-    }
+    for (const std::string& name : names)
+        fields.push_back({name, Scalar::float64, 1, std::nullopt, 0});
     return fields;
 }
 
@@ -127,6 +131,11 @@ std::string name_in_cell(std::string_view cell) {
 /// A text of cells between commas or semicolons, as words between blanks; nothing for other texts. With semicolons, a
 /// comma is a decimal point.
 std::optional<std::string> words_for_cells(std::string_view bytes) {
+    std::size_t begin = bytes.starts_with(byte_order_mark) ? byte_order_mark.size() : 0;
+    while (begin < bytes.size() && (bytes[begin] == '#' || bytes[begin] == '\n' || bytes[begin] == '\r'))
+        begin = std::min(bytes.find('\n', begin), bytes.size() - 1) + 1;
+    const std::string_view before = bytes.substr(0, begin);
+    bytes.remove_prefix(begin);
     const std::string_view first = bytes.substr(0, bytes.find('\n'));
     const char between = first.find(';') != std::string_view::npos ? ';' : ',';
     if (first.find(between) == std::string_view::npos)
@@ -143,24 +152,55 @@ std::optional<std::string> words_for_cells(std::string_view bytes) {
     std::ranges::replace(text, between, ' ');
     if (between == ';')
         std::ranges::replace(text, ',', '.');
-    return text;
+    return std::string(before) + text;
 }
 
-/// "//X Y Z R G B" as names of ours; none where a word is no name.
+/// "//X Y Z Rf Gf Bf" or "Easting Northing Height [m]" as names of ours.
 std::vector<std::string> names_in(const std::vector<std::string_view>& words) {
     std::vector<std::string> names;
     for (std::string_view word : words) {
         while (word.starts_with('/') || word.starts_with('#'))
             word.remove_prefix(1);
-        if (word.empty())
-            continue;
         std::string name(word);
         std::transform(name.begin(), name.end(), name.begin(),
                        [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-        name = name == "r" ? "red" : name == "g" ? "green" : name == "b" ? "blue" : name;
-        names.push_back(name);
+        if (const std::size_t unit = name.find_first_of("[("); unit != std::string::npos)
+            name.erase(name.find_last_not_of('_', std::max<std::size_t>(unit, 1) - 1) + 1);
+        if (!name.empty())
+            names.push_back(name);
     }
+    struct Known {
+        std::string_view theirs, ours;
+    };
+    constexpr std::array known{Known{"rf", "red"},    Known{"gf", "green"},    Known{"bf", "blue"},
+                               Known{"r", "red"},     Known{"g", "green"},     Known{"b", "blue"},
+                               Known{"easting", "x"}, Known{"east", "x"},      Known{"northing", "y"},
+                               Known{"north", "y"},   Known{"elevation", "z"}, Known{"height", "z"}};
+    for (const auto& [theirs, ours] : known)
+        if (const auto found = std::ranges::find(names, theirs);
+            found != names.end() && std::ranges::find(names, ours) == names.end())
+            *found = ours;
     return names;
+}
+
+bool names_axes(const std::vector<std::string>& names) {
+    return std::ranges::all_of(std::array{"x", "y", "z"},
+                               [&](const char* axis) { return std::ranges::count(names, axis) == 1; });
+}
+
+/// The metres of "X [mm]"; 1 where no unit is named.
+double unit_in(std::string_view line) {
+    struct Unit {
+        std::string_view name;
+        double metres;
+    };
+    constexpr std::array units{Unit{"mm", 0.001}, Unit{"cm", 0.01}, Unit{"dm", 0.1}, Unit{"km", 1000},
+                               Unit{"ft", 0.3048}};
+    const std::size_t open = line.find_first_of("[("), close = line.find_first_of("])");
+    if (open == std::string_view::npos || close == std::string_view::npos || close < open)
+        return 1;
+    const auto found = std::ranges::find(units, line.substr(open + 1, close - open - 1), &Unit::name);
+    return found == units.end() ? 1 : found->metres;
 }
 
 bool all_numbers(const std::vector<std::string_view>& words) {
@@ -173,36 +213,81 @@ void check_point_count(std::uint64_t count, const fs::path& file) {
         throw Error(fmt::format("{}: {} points, at most {} are read", file.string(), count, most_points));
 }
 
-/// Throws Error unless the line has as many words, all numbers.
-void check_numbers(const TextRecords& lines, std::size_t expected, const fs::path& file) {
-    if (lines.words().size() != expected)
+/// Throws Error unless the line has a number for each field.
+void check_numbers(const TextRecords& lines, const std::vector<CloudField>& fields, const fs::path& file) {
+    if (lines.words().size() != fields.size())
         throw Error(fmt::format("{}: {}, expected {} as in the first", at_line(file, lines.line()),
-                                counted(lines.words().size(), "value"), expected));
-    for (const auto word : lines.words())
-        if (!number(word))
-            throw Error(fmt::format("{}: {} is not a number", at_line(file, lines.line()), in_quotes(word)));
+                                counted(lines.words().size(), "value"), fields.size()));
+    for (std::size_t i = 0; i < fields.size(); ++i)
+        if (!number(lines.words()[i]))
+            throw Error(fmt::format("{}: {} in column {} ({}) is not a number", at_line(file, lines.line()),
+                                    in_quotes(lines.words()[i]), i + 1, fields[i].name));
 }
 
-/// The lines of `body` as records of equally many words.
-void read_lines(CloudRecords& records, std::string_view body, int first_line, const fs::path& file) {
+/// Of x y z and four columns more: whether all points say that colours come before a scalar (CloudCompare's order), not
+/// behind an intensity. Where both would do, the intensity comes first, with a warning.
+bool colours_come_first(std::string_view body, const fs::path& file, std::vector<std::string>& warnings) {
+    std::array<bool, 7> bytes{}, varies{};
+    std::array<double, 7> first{};
+    bytes.fill(true);
+    TextRecords lines(body, 1);
+    for (bool begun = false; lines.next(); begun = true) {
+        if (lines.words().size() != bytes.size())
+            continue; // refused elsewhere
+        for (std::size_t i = 3; i < bytes.size(); ++i) {
+            const double value = number(lines.words()[i]).value_or(-1);
+            bytes[i] = bytes[i] && value >= 0 && value <= 255 && value == std::floor(value);
+            varies[i] = varies[i] || (begun && value != first[i]);
+            if (!begun)
+                first[i] = value;
+        }
+    }
+    if (!bytes[4] || !bytes[5])
+        return false;
+    const bool before = bytes[3], behind = bytes[6];
+    if (before != behind || !before)
+        return before;
+    if (varies[3] != varies[6]) // a scalar that is the same everywhere is no colour
+        return varies[3];
+    if (varies[3])
+        warnings.push_back(file.string() +
+                           ": seven columns without names: taken as x y z intensity red green blue. A line of "
+                           "names, such as //X Y Z R G B Scalar, tells another order.");
+    return false;
+}
+
+/// The lines of `body` as records of equally many words. A number alone begins the next scan of a .pts.
+void read_lines(CloudRecords& records, std::string_view body, int first_line, const fs::path& file,
+                std::vector<std::string>& warnings) {
     TextRecords lines(body, first_line);
     const auto names_of_first = [&](std::size_t columns) {
         auto first = first_numbers(body, false);
         if (first.empty()) // refused below
             first.emplace_back(columns);
-        return usual_names(first);
+        return usual_names(first, columns == 7 && colours_come_first(body, file, warnings));
     };
-    while (lines.next()) {
+    std::size_t behind = 0; // the last word that was kept
+    for (bool block = false; lines.next();) {
+        const std::vector<std::string_view>& line = lines.words();
+        if (records.fields.size() > 1 && line.size() == 1 && whole_number(line[0])) {
+            block = true;
+            continue;
+        }
         if (records.fields.empty())
-            records.fields = fields_named(names_of_first(lines.words().size()));
-        check_numbers(lines, records.fields.size(), file);
-        records.ends.push_back(lines.end());
+            records.fields = fields_named(names_of_first(line.size()));
+        check_numbers(lines, records.fields, file);
+        if (std::exchange(block, false)) { // the count between blocks is no part of the records
+            const auto start = static_cast<std::size_t>(line.front().data() - body.data());
+            records.inserted.emplace(records.ends.size(), body.substr(behind, start - behind));
+            behind = start;
+        }
+        records.points += body.substr(behind, lines.end() - behind);
+        behind = lines.end();
+        records.ends.push_back(records.points.size());
     }
     records.point_count = records.ends.size();
     check_point_count(records.point_count, file);
-    const std::size_t used = records.ends.empty() ? 0 : records.ends.back();
-    records.points = body.substr(0, used);
-    records.after = body.substr(used);
+    records.after = body.substr(behind);
     records.grid = {static_cast<int>(records.point_count), 1};
 }
 
@@ -253,7 +338,7 @@ PtxHeader ptx_header(std::string_view bytes, int first_line, const fs::path& fil
     const auto lines = header_lines(bytes, PtxHeader::lines, header.length, file, first_line);
     for (std::size_t i = 0; i < 2; ++i) {
         const auto size = lines[i].size() == 1 ? whole_number(lines[i][0]) : std::nullopt;
-        if (!size || *size == 0 || *size > 1U << 20)
+        if (!size || *size > 1U << 20)
             throw Error(fmt::format("{}: expected the number of {}", at_line(file, first_line + static_cast<int>(i)),
                                     i == 0 ? "columns" : "rows"));
         (i == 0 ? header.columns : header.rows) = *size;
@@ -294,6 +379,9 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file, std::vector<
         const std::string scan = scans == 0 ? "" : fmt::format("scan {}: ", scans + 1);
         TextRecords lines(bytes.substr(at), line);
         const std::uint64_t expected = header.points(), before = records.point_count;
+        if (expected == 0)
+            warnings.push_back(fmt::format("{}: {}no points: {} columns of {} rows.", file.string(), scan,
+                                           header.columns, header.rows));
         check_point_count(before + expected, file);
         std::uint64_t found = 0;
         for (; found < expected && lines.next(); ++found) {
@@ -303,7 +391,7 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file, std::vector<
                                         at_line(file, lines.line()), counted(columns, "value")));
             if (records.fields.empty())
                 records.fields = fields_named(ptx_names(columns));
-            check_numbers(lines, records.fields.size(), file);
+            check_numbers(lines, records.fields, file);
             const std::size_t end = at + lines.end();
             if (found == 0 && scans > 0) { // the header between scans is no part of the records
                 const auto start = static_cast<std::size_t>(lines.words().front().data() - bytes.data());
@@ -341,77 +429,117 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file, std::vector<
     return records;
 }
 
+namespace {
+
+/// What comes before the points: comments, names of columns, the number of points; each may be left out.
+struct TextHeader {
+    std::size_t length = 0;
+    int lines = 0;
+    std::vector<std::string> names;
+    std::size_t names_end = 0; ///< behind the last word of the line of names
+    double metres = 1;         ///< a unit of the coordinates
+    std::optional<std::uint64_t> said;
+    std::string odd; ///< a line that is neither names with x y z nor numbers
+};
+
+TextHeader text_header(std::string_view bytes) {
+    TextHeader header;
+    constexpr int most_lines = 1000;
+    std::size_t at = header.length = bytes.starts_with(byte_order_mark) ? byte_order_mark.size() : 0;
+    while (at < bytes.size() && header.lines < most_lines) {
+        const std::size_t end = std::min(bytes.find('\n', at), bytes.size());
+        const std::string_view text = trimmed(bytes.substr(at, end - at));
+        const auto line = words(text);
+        const bool comment = text.starts_with('#') || text.starts_with("//");
+        if (!line.empty() && !comment && all_numbers(line)) {
+            if (line.size() > 1 || header.said || !whole_number(line[0]))
+                break;
+            header.said = whole_number(line[0]);
+        } else if (const auto names = names_in(line); names_axes(names)) {
+            header.names = names;
+            header.names_end = at + static_cast<std::size_t>(text.data() + text.size() - (bytes.data() + at));
+            header.metres = unit_in(text);
+        } else if (!line.empty() && !comment) {
+            if (header.names.empty()) // else a point, whose words are refused one by one
+                header.odd = text;
+            break;
+        }
+        at = std::min(end + 1, bytes.size());
+        ++header.lines;
+        header.length = at;
+    }
+    return header;
+}
+
+} // namespace
+
 bool is_text_cloud(std::string_view start) {
     constexpr std::size_t enough = 4096, not_a_matrix = 8;
     const bool cut = start.size() >= enough;
     start = start.substr(0, enough);
     const std::optional<std::string> of_cells = words_for_cells(start);
     start = of_cells ? *of_cells : start;
-    const std::size_t first_end = std::min(start.find('\n'), start.size());
-    const auto first = words(start.substr(0, first_end));
-    bool named = !first.empty() && !all_numbers(first);
-    if (named) {
-        const auto names = names_in(first);
-        for (const char* axis : {"x", "y", "z"})
-            if (std::ranges::count(names, axis) != 1)
-                return false;
-        if (std::ranges::count(names, "qw") > 0) // poses
-            return false;
-        start.remove_prefix(std::min(first_end + 1, start.size()));
+    const TextHeader header = text_header(start);
+    const auto lines = first_numbers(start.substr(header.length), cut);
+    if (!header.names.empty()) { // words in other columns are refused by their line
+        const std::string_view first = start.substr(header.length, start.find('\n', header.length) - header.length);
+        return std::ranges::count(header.names, "qw") == 0 && // poses
+               words(first).size() == header.names.size() && (lines.size() >= not_a_matrix || lines.empty());
     }
-    const auto lines = first_numbers(start, cut);
-    if (lines.size() < not_a_matrix)
+    if (!header.odd.empty() || lines.size() < not_a_matrix)
         return false;
     const std::size_t columns = lines.front().size();
-    if (named)
-        return columns >= 3;
     const auto colours_from = [&](std::size_t first_column) {
         return triple_in(lines, first_column) == Triple::colours;
     };
-    return columns == 3 || (columns == 6 && (colours_from(3) || triple_in(lines, 3) == Triple::normals)) ||
-           (columns == 7 && colours_from(4)) ||
+    // Times and positions have four columns, too, but times rise; and so have poses, with rows of 0 0 0 1.
+    const auto of_intensity = [&] {
+        return lines.size() >= std::min(enough_lines, start.size() / 64) &&
+               !std::ranges::is_sorted(lines, {}, [](const auto& line) { return line[0]; }) &&
+               std::ranges::all_of(lines, [](const auto& line) { return line[3] >= 0; }) &&
+               std::ranges::count(lines, std::vector<double>{0, 0, 0, 1}) == 0;
+    };
+    return columns == 3 || (columns == 4 && of_intensity()) ||
+           (columns == 6 && (colours_from(3) || triple_in(lines, 3) == Triple::normals)) ||
+           (columns == 7 && (colours_from(4) || colours_from(3))) ||
            (columns == 9 && colours_from(3) && triple_in(lines, 6) == Triple::normals);
 }
 
 CloudRecords read_xyz(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
     const std::optional<std::string> of_cells = words_for_cells(bytes);
     bytes = of_cells ? *of_cells : bytes;
+    const TextHeader header = text_header(bytes);
+    if (!header.odd.empty())
+        throw Error(fmt::format("{}: {}, expected numbers, or names of columns with x, y and z among them",
+                                at_line(file, header.lines + 1), in_quotes(header.odd)));
     CloudRecords records;
     records.encoding = CloudRecords::Encoding::ascii;
-    std::size_t length = 0;
-    const auto first = header_lines(bytes, 1, length, file).front();
-    const bool counted_first = first.size() == 1 && whole_number(first[0]);
-    const std::uint64_t said = counted_first ? whole_number(first[0]).value_or(0) : 0;
-    const bool named = !first.empty() && !all_numbers(first);
-    if (named) {
-        const auto names = names_in(first);
-        for (const char* axis : {"x", "y", "z"})
-            if (std::count(names.begin(), names.end(), axis) != 1)
-                throw Error(fmt::format("{}: expected numbers, or names of columns with x, y and z among them",
-                                        at_line(file, 1)));
-        records.fields = fields_named(names);
-    }
-    if (!counted_first && !named)
-        length = 0;
-    records.header = bytes.substr(0, length);
-    read_lines(records, bytes.substr(length), length > 0 ? 2 : 1, file);
+    records.fields = fields_named(header.names);
+    records.scale.fill(header.metres);
+    records.header = bytes.substr(0, header.length);
+    read_lines(records, bytes.substr(header.length), header.lines + 1, file, warnings);
     if (records.fields.size() < 3 && records.point_count > 0)
         throw Error(fmt::format("{}: {} a line, expected x y z at least", file.string(),
                                 counted(records.fields.size(), "value")));
     if (records.fields.empty())
         records.fields = fields_named({"x", "y", "z"});
-    if (counted_first && said != records.point_count)
+    if (header.said && *header.said != records.point_count && records.inserted.empty())
+        warnings.push_back(fmt::format("{}: says {} points, holds {}; all are read.", file.string(), *header.said,
+                                       records.point_count));
+    if (!records.inserted.empty())
         warnings.push_back(
-            fmt::format("{}: says {} points, holds {}; all are read.", file.string(), said, records.point_count));
+            fmt::format("{}: {} scans are read as one cloud.", file.string(), records.inserted.size() + 1));
     return records;
 }
 
 std::string text_bytes(const CloudRecords& records, std::string points, const std::vector<FieldAddition>& additions) {
     std::string header = records.header;
-    const auto names = words(header);
-    if (!names.empty() && !number(names[0])) // a line of names gets those of the new columns
-        for (const FieldAddition& addition : additions)
-            header.insert(header.find_last_not_of("\r\n") + 1, " " + addition.name);
+    const TextHeader read = text_header(header);
+    std::string added;
+    for (const FieldAddition& addition : additions)
+        added += " " + addition.name;
+    if (!read.names.empty())
+        header.insert(read.names_end, added);
     return between(header, std::move(points), records.after);
 }
 
@@ -432,6 +560,29 @@ bool has_rings(std::string_view bytes, const fs::path& file) {
     return true;
 }
 
+/// Records of other fields, read as these, hold numbers that no scanner measures: absurd, or next to nothing (whole
+/// numbers read as floats), or a reflectance that is negative or above 16 bits.
+void check_sweep(std::string_view bytes, std::size_t stride, const fs::path& file) {
+    constexpr float absurd = 1e6F, next_to_nothing = 1e-30F, most_reflectance = 65535;
+    std::size_t odd = 0, all = 0;
+    for (std::size_t at = 0; at + stride <= bytes.size(); at += stride, ++all) {
+        std::array<float, 4> p{};
+        for (std::size_t i = 0; i < p.size(); ++i)
+            p[i] = static_cast<float>(decoded(bytes.data() + at + i * sizeof(float), Scalar::float32, false));
+        const bool fits = std::ranges::none_of(p, [](float value) {
+            return std::abs(value) > absurd || (value != 0 && std::abs(value) < next_to_nothing);
+        });
+        odd += !fits || p[3] < 0 || p[3] > most_reflectance;
+    }
+    constexpr std::size_t few = 20; // one of so many
+    if (odd * few > all)
+        throw Error(
+            fmt::format("{}: does not look like records of x y z reflectance (16 bytes) or x y z intensity ring "
+                        "(20): {} of {} have absurd values or a negative reflectance. Convert it to PLY or PCD, "
+                        "which name their fields",
+                        file.string(), odd, all));
+}
+
 } // namespace
 
 CloudRecords read_kitti(std::string_view bytes, const fs::path& file, std::vector<std::string>&) {
@@ -443,6 +594,7 @@ CloudRecords read_kitti(std::string_view bytes, const fs::path& file, std::vecto
         throw Error(fmt::format("{}: {} bytes are not whole points of {} ({} as floats)", file.string(), bytes.size(),
                                 stride, fmt::join(names, " ")));
     check_point_count(bytes.size() / stride, file);
+    check_sweep(bytes, stride, file);
     CloudRecords records;
     records.encoding = CloudRecords::Encoding::binary;
     records.point_count = bytes.size() / stride;
