@@ -249,7 +249,7 @@ bool colours_come_first(std::string_view body, const fs::path& file, std::vector
         return before;
     if (varies[3] != varies[6]) // a scalar that is the same everywhere is no colour
         return varies[3];
-    if (varies[3])
+    if (varies[3] && lower_extension(file) != ".pts") // whose intensity is the fourth
         warnings.push_back(file.string() +
                            ": seven columns without names: taken as x y z intensity red green blue. A line of "
                            "names, such as //X Y Z R G B Scalar, tells another order.");
