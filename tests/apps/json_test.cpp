@@ -17,7 +17,7 @@ TEST(ReadingJson, broken_missing_and_mistyped_values_are_errors_that_name_the_fi
         says(refusal([&] { (void)reading_json("plan.json", [] { return json::parse("{3"); }); }), "plan.json: "));
     EXPECT_TRUE(says(refusal([&] { reading_json("plan.json", [&] { (void)text.at("cost"); }); }), "cost"));
     EXPECT_TRUE(says(refusal([&] { reading_json("plan.json", [&] { (void)text.at("frames").get<int>(); }); }),
-                     "must be number"));
+                     "a value is of another type than expected"));
 }
 
 TEST(ReadingJson, other_exceptions_stay_what_during_makes_of_them) {

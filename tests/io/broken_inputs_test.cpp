@@ -172,7 +172,7 @@ TEST_F(BrokenClouds, pcd_headers_are_checked_line_by_line) {
     EXPECT_TRUE(says(with("SIZE 4 4 4", "SIZE 4 3 4"), "line 3: SIZE 3"));
     EXPECT_TRUE(says(with("SIZE 4 4 4", "SIZE 4 4"), "line 3: SIZE has 2 values, expected 3"));
     EXPECT_TRUE(says(with("TYPE F F F", "TYPE F X F"), "line 4"));
-    EXPECT_TRUE(says(with("COUNT 1 1 1", "COUNT 1 0 1"), "line 5: COUNT 0"));
+    EXPECT_TRUE(says(with("COUNT 1 1 1", "COUNT 1 0 1"), "line 2: no field y"));
     EXPECT_TRUE(says(with("COUNT 1 1 1", "COUNT 1 99999999999 1"), "line 5"));
     EXPECT_TRUE(says(with("WIDTH 2", "WIDTH 3"), "WIDTH 3 x HEIGHT 1 is 3, but POINTS says 2"));
     EXPECT_TRUE(says(with("WIDTH 2", "WIDTH -2"), "line 6"));
