@@ -163,7 +163,7 @@ TEST(PlyColours, of_any_width_and_name_are_bytes_and_come_back_as_they_were) {
         std::istringstream words(names_left);
         for (std::string name; words >> name;)
             properties += fmt::format("property {} {}\n", type, name);
-        const auto value = [&](int byte) { return fmt::format("{}", full * byte / 255); };
+        const auto value = [full = full](int byte) { return fmt::format("{}", full * byte / 255); };
         const fs::path file =
             write_file(folder / "c.ply",
                        fmt::format("ply\nformat ascii 1.0\nelement vertex 2\n{}end_header\n"
@@ -226,7 +226,8 @@ TEST(BareFloats, of_other_records_are_refused) {
         to.append(reinterpret_cast<const char*>(&value), sizeof value);
     };
     for (int k = 0; k < 400; ++k) {
-        for (const float value : {0.01F * static_cast<float>(k % 20) - 0.1F, 0.01F * static_cast<float>(k / 20) - 0.1F,
+        const int row = k / 20;
+        for (const float value : {0.01F * static_cast<float>(k % 20) - 0.1F, 0.01F * static_cast<float>(row) - 0.1F,
                                   -1.0F, 200.0F, 100.0F, 50.0F})
             add(six, value);
         for (const float value : {0.1F * static_cast<float>(k), 2.0F, -1.0F, 0.5F})
