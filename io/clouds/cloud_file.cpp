@@ -155,11 +155,11 @@ double colour_step_in(const CloudRecords& records, const std::array<std::size_t,
     double largest = 0; // NaN is smaller
     for (std::size_t i = 0; i < records.point_count; ++i)
         for (const std::size_t channel : bgr)
-            largest = std::max(largest, value_at(records, records.record(i), channel));
+            if (largest = std::max(largest, value_at(records, records.record(i), channel)); largest > 255)
+                return records.format->wide_colours ? 256 : 257;
     const Scalar type = records.fields[bgr[0]].type;
-    if ((type == Scalar::float32 || type == Scalar::float64) && largest > 0 && largest <= 1)
-        return 1 / 255.0;
-    return largest <= 255 ? 1 : records.format->wide_colours ? 256 : 257;
+    const bool real = type == Scalar::float32 || type == Scalar::float64;
+    return real && largest > 0 && largest <= 1 ? 1 / 255.0 : 1;
 }
 
 } // namespace
@@ -312,10 +312,6 @@ void warn_of_colours(const CloudRecords& records, const fs::path& file, std::vec
             return;
         }
 }
-
-} // namespace
-
-namespace {
 
 template <class Number>
 void append(std::string& bytes, Number value) {

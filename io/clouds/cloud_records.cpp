@@ -200,10 +200,11 @@ ColourFields colour_fields(const CloudRecords& records) {
         if (f.count == 1 && !f.list_length && size_of(f.type) == 4)
             found.packed = field;
     }
-    constexpr std::array<std::array<const char*, 3>, 4> names{{{"diffuse_blue", "diffuse_green", "diffuse_red"},
-                                                               {"blue", "green", "red"},
+    // The last that are there count; "Rf" are CloudCompare's fractions.
+    constexpr std::array<std::array<const char*, 3>, 4> names{{{"bf", "gf", "rf"},
                                                                {"b", "g", "r"},
-                                                               {"bf", "gf", "rf"}}}; // fractions, CloudCompare
+                                                               {"diffuse_blue", "diffuse_green", "diffuse_red"},
+                                                               {"blue", "green", "red"}}};
     for (const auto& [b, g, r] : names) {
         const auto blue = records.field_named(b), green = records.field_named(g), red = records.field_named(r);
         const auto is_number = [&](const std::optional<std::size_t>& i) {

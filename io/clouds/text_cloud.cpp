@@ -446,18 +446,25 @@ TextHeader text_header(std::string_view bytes) {
     TextHeader header;
     constexpr int most_lines = 1000;
     std::size_t at = header.length = bytes.starts_with(byte_order_mark) ? byte_order_mark.size() : 0;
+    bool in_comment = false; // the names
     while (at < bytes.size() && header.lines < most_lines) {
         const std::size_t end = std::min(bytes.find('\n', at), bytes.size());
         const std::string_view text = trimmed(bytes.substr(at, end - at));
         const auto line = words(text);
         const bool comment = text.starts_with('#') || text.starts_with("//");
         if (!line.empty() && !comment && all_numbers(line)) {
-            if (line.size() > 1 || header.said || !whole_number(line[0]))
+            if (line.size() > 1 || header.said || !whole_number(line[0])) {
+                if (in_comment && header.names.size() != line.size()) { // a sentence, such as "x y z in metres"
+                    header.names.clear();
+                    header.metres = 1;
+                }
                 break;
+            }
             header.said = whole_number(line[0]);
         } else if (const auto names = names_in(line); names_axes(names)) {
             header.names = names;
-            header.names_end = at + static_cast<std::size_t>(text.data() + text.size() - (bytes.data() + at));
+            header.names_end = static_cast<std::size_t>(text.data() + text.size() - bytes.data());
+            in_comment = comment;
             header.metres = unit_in(text);
         } else if (!line.empty() && !comment) {
             if (header.names.empty()) // else a point, whose words are refused one by one

@@ -77,6 +77,7 @@ INSTANTIATE_TEST_SUITE_P(
                     TextCloud{"millimetres.csv", "X [mm],Y [mm],Z [mm]\n" + rows(","), {}, nullptr, 0.001},
                     TextCloud{"survey.csv", "Easting,Northing,Elevation\n" + rows(",")},
                     TextCloud{"height.csv", "x,y,z,height\n" + rows(",", [](int) { return ",2"; })},
+                    TextCloud{"sentence.xyz", "# x y z in metres\n" + rows(" ")},
                     TextCloud{"comments.xyz", "# by hand\n# x y\n" + rows(" ")},
                     TextCloud{"names_in_a_comment.txt", "# by hand\n# x y z r g b\n" + rows(" ", bytes), {0, 240, 150}},
                     TextCloud{"names_then_count.asc",
