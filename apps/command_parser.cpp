@@ -31,13 +31,16 @@ void add_flag(CLI::App& parser, const Parameter& row, Given& given) {
         parser.add_option_function<std::string>(names, take);
 }
 
+/// Whether a word is the flag, long or short.
+bool names(const std::string& word, const Parameter& row) {
+    return word == flag_of(row) || flag_names(row) == word + "," + flag_of(row);
+}
+
 /// The arguments, with "--overwrite no" as "--overwrite=no": a switch takes a next word of these four and no other,
 /// which may be a path.
 std::vector<std::string> joined(const std::vector<std::string>& arguments, const std::vector<Parameter>& rows) {
     const auto is_the_switch = [&](const std::string& word) {
-        return std::ranges::any_of(rows, [&](const Parameter& row) {
-            return is_switch(row) && (word == flag_of(row) || flag_names(row) == word + "," + flag_of(row));
-        });
+        return std::ranges::any_of(rows, [&](const Parameter& row) { return is_switch(row) && names(word, row); });
     };
     std::vector<std::string> words;
     for (const std::string& argument : arguments)
@@ -71,7 +74,10 @@ void refuse_unknown_flag(const std::vector<std::string>& unknown, const std::vec
         throw Misuse(fmt::format("{} {} expected at most, more are given", words.at_most, name));
     const auto row = std::ranges::find_if(rows, [&](const Parameter& each) { return flag_of(each) == name; });
     const std::string range = row == rows.end() ? "" : range_text(*row);
-    if (!arguments.empty() && arguments.back().starts_with('-') && arguments.back().find('=') == std::string::npos)
+    const auto given = row == rows.end() ? 0 : std::ranges::count_if(arguments, [&](const std::string& word) {
+        return names(word.substr(0, word.find('=')), *row);
+    });
+    if (given == 1)
         throw Misuse(fmt::format("{} needs a value{}{}", name, range.empty() ? "" : ": ", range));
     throw Misuse(fmt::format("{} is given more than once", name));
 }

@@ -705,7 +705,7 @@ TEST(CliHelpTest, mistyped_words_get_the_nearest_one_as_a_hint) {
           std::pair("run x -o y --write ao,shadde", "did you mean shaded?"), std::pair("run -o y", "PATH is missing"),
           std::pair("compare x y z", "2 PATH expected at most"), std::pair("run x -o", "--out needs a value"),
           std::pair("run x -o y --radius", "--radius needs a value: m, 0 or more"),
-          std::pair("run x -o y --radius 1 --radius 2", "--radius is given more than once"),
+          std::pair("run x -o y --radius 1 --radius=2 --overwrite", "--radius is given more than once"),
           std::pair("run x -o y --overwrite=maybe", "'maybe' given, expected yes | no"),
           std::pair("run x -o y --settings /nowhere.json", "settings: the file is missing"),
           std::pair("run x -o y --settings /dev/null", "settings line 1: not JSON"),
