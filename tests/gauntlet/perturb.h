@@ -42,6 +42,7 @@ struct Perturbed {
 struct Perturbation {
     std::string_view name;
     void (*apply)(Perturbed& perturbed, const Known& known);
+    bool normals = false;       ///< of recorded normals: needs an unperturbed result that nothing makes doubtful
     bool recorded_only = false; ///< makes sense only where normals are recorded
     bool turns_all = false;     ///< makes sense only where the cloud itself tells its sides
     bool other_density = false; ///< the automatic radius may differ: the unperturbed cloud is computed again with it

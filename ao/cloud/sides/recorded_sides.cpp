@@ -106,17 +106,21 @@ RepairedSides repaired_sides(const CloudSurface& surface) {
     tbb::parallel_sort(opposed.begin(), opposed.end(), [](const Opposed& one, const Opposed& other) {
         return std::tuple(-one.smooth, one.a, one.b) < std::tuple(-other.smooth, other.a, other.b);
     });
+    std::vector<char> joined(surface.size(), 0); // by piece: of parts that oppose each other
     for (const Opposed& pair : opposed)
-        if (const Pieces::Member one = pieces.find(pair.a), other = pieces.find(pair.b); one.piece != other.piece)
+        if (const Pieces::Member one = pieces.find(pair.a), other = pieces.find(pair.b); one.piece != other.piece) {
             pieces.join(one, other, true);
+            joined[pieces.find(pair.a).piece] = 1;
+        }
     std::vector<std::int32_t> votes(surface.size(), 0); // by piece: points as its first one, less the others
     for (std::size_t i = 0; i < surface.size(); ++i) {
         const auto [piece, turned] = pieces.find(static_cast<std::uint32_t>(i));
         votes[piece] += turned ? -1 : 1;
     }
-    RepairedSides repaired{std::vector<std::int8_t>(surface.size()), 0, 0};
+    RepairedSides repaired{.sign = std::vector<std::int8_t>(surface.size())};
     constexpr double least_majority = 0.1; // of a piece's points: fewer may be chance
-    std::size_t undecided = 0, turned_over = 0;
+    std::size_t undecided = 0, turned_over = 0, in_joined = 0;
+    double minority = 0;
     for (std::size_t i = 0; i < surface.size(); ++i) {
         const Pieces::Member member = pieces.find(static_cast<std::uint32_t>(i));
         const std::int32_t vote = votes[member.piece];
@@ -124,10 +128,15 @@ RepairedSides repaired_sides(const CloudSurface& surface) {
         repaired.sign[i] = static_cast<std::int8_t>(!decided ? 0 : (vote < 0) == member.turned ? 1 : -1);
         undecided += !decided;
         turned_over += repaired.sign[i] < 0;
+        if (joined[member.piece]) {
+            ++in_joined;
+            minority += 0.5 - 0.5 * std::abs(vote) / pieces.size(member);
+        }
     }
     const auto all = static_cast<double>(std::max<std::size_t>(surface.size(), 1));
     repaired.undecided = static_cast<double>(undecided) / all;
     repaired.turned = static_cast<double>(turned_over) / all;
+    repaired.minority = minority / static_cast<double>(std::max<std::size_t>(in_joined, 1));
     return repaired;
 }
 

@@ -65,6 +65,9 @@ struct RepairedSides {
         sign;             ///< by index in the tree: -1 = the normal has to be turned, 0 = its piece is undecided
     double undecided = 0; ///< share of the points
     double turned = 0;    ///< share of the points with sign -1
+    /// Of the points in pieces that opposed pairs joined, those that recorded what fewer did: how much was recorded
+    /// wrong. The other pieces say nothing of it.
+    double minority = 0;
 };
 /// Smooth pairs that agree join points to pieces. Those that oppose join pieces, the smoothest first (a maximum
 /// spanning forest). Every piece takes the side that most of its points recorded. It is undecided where the majority is
