@@ -1,6 +1,7 @@
 #include "apps/doubts/of_view.h"
 
 #include "projection/scene_extent.h"
+#include "projection/sensor/depth_buffer.h"
 #include "projection/sensor/depth_ends.h"
 #include "projection/sensor/depth_kind.h"
 #include "projection/undistort.h"
@@ -105,6 +106,11 @@ void doubt_steps_in_view(double radius_m, const DepthNoise& noise, const LengthU
 }
 
 void doubt_kind(const DepthImage& depth, Doubts& doubts) {
+    if (is_depth_buffer(depth)) {
+        doubts.emplace_back("planes bend as if the image held a renderer's depth buffer, 0 .. 1 between its near and "
+                            "its far plane: make it linear, z = near far / (far - value (far - near)).");
+        return;
+    }
     const DepthKind kind = depth_kind(depth);
     add_if(kind == DepthKind::inverse, doubts,
            "planes bend as if the image held disparities or inverse depths, larger where surfaces are nearer: convert "

@@ -10,7 +10,7 @@
 namespace scanshade {
 
 void doubt_camera(const Camera& camera, Doubts& doubts);
-/// Planes that bend as those of ranges or of disparities do.
+/// Planes that bend as those of ranges, of disparities or of a renderer's depth buffer do.
 void doubt_kind(const DepthImage& depth, Doubts& doubts);
 /// One value at either end of the depths that no surface explains.
 void doubt_ends(const DepthImage& depth, const LengthUnit& unit, Doubts& doubts);
