@@ -3,6 +3,7 @@
 
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
+#include "io/clouds/splats.h"
 #include "projection/base/error.h"
 #include "projection/pixel_cloud.h"
 
@@ -68,6 +69,8 @@ bool is_image_in_millimetres(const Cloud& cloud, double middle) {
 
 void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame) {
     frame.cloud = read_cloud(entry.cloud, frame.warnings);
+    if (auto doubt = doubt_of_splats(*frame.cloud))
+        frame.doubts.push_back(*std::move(doubt));
     if (frame.cloud->records->viewpoint)
         frame.world_from_camera = frame.cloud->records->viewpoint;
     if (frame.cloud->organised()) {

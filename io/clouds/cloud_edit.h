@@ -15,14 +15,16 @@ namespace scanshade {
 /// Points without usable coordinates, or that their file does not want used.
 struct PointOddities {
     std::size_t all = 0, absurd = 0, unusable = 0;
-    std::size_t left_out = 0; ///< LAS: withheld, or classified as noise
+    std::size_t left_out = 0;    ///< LAS: withheld, or classified as noise; splats: of next to no opacity
+    bool splats = false;         ///< the points are Gaussian splats
+    std::size_t translucent = 0; ///< splats whose opacity is below a half, but for those left out
 };
-/// In the cloud's unit; NaN in all three coordinates where they are infinite, absurd (> 1e30) or unknown, and where LAS
-/// marks the point as withheld or as noise.
+/// In the cloud's unit; NaN in all three coordinates where they are infinite, absurd (> 1e30) or unknown, where LAS
+/// marks the point as withheld or as noise, and where a splat has next to no opacity.
 [[nodiscard]] std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, PointOddities& odd);
 void warn_of(const PointOddities& odd, const std::filesystem::path& file, std::vector<std::string>& warnings);
 
-/// BGR; empty where there are none.
+/// BGR, of splats the one they show from all sides; empty where there are none.
 [[nodiscard]] std::vector<cv::Vec3b> colours_of(const CloudRecords& records);
 /// The divisor of colours in three fields, as these records tell it; 0 where there are none.
 [[nodiscard]] double colour_step_of(const CloudRecords& records);

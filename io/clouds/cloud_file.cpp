@@ -4,6 +4,7 @@
 #include "io/clouds/cloud_edit.h"
 #include "io/clouds/cloud_records.h"
 #include "io/clouds/format.h"
+#include "io/clouds/splats.h"
 #include "io/output_file.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -108,10 +109,14 @@ std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, PointOdditie
         place_coordinate(records, "z", 2, points);
     }
     const LeftOut is_left_out(records);
-    std::atomic<std::size_t> absurd = 0, unusable = 0, left_out = 0; // hardly ever counted up
+    const std::optional<SplatFields> splats = splat_fields(records);
+    std::atomic<std::size_t> absurd = 0, unusable = 0, left_out = 0, translucent = 0; // hardly ever counted up
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
         Eigen::Vector3d& point = points[i];
-        const bool usable = (point.array().abs() <= largest_coordinate).all(), unwanted = is_left_out(i);
+        const double opacity = splats ? opacity_of(records, *splats, i) : 1;
+        const bool usable = (point.array().abs() <= largest_coordinate).all(),
+                   unwanted = is_left_out(i) || !(opacity >= least_opacity);
+        translucent += usable && !unwanted && opacity < solid_opacity;
         if (usable && !unwanted)
             return;
         ++unusable;
@@ -123,6 +128,8 @@ std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, PointOdditie
     odd.absurd += absurd;
     odd.unusable += unusable;
     odd.left_out += left_out;
+    odd.splats |= splats.has_value();
+    odd.translucent += translucent;
     return points;
 }
 
@@ -130,7 +137,15 @@ void warn_of(const PointOddities& odd, const fs::path& file, std::vector<std::st
     if (odd.absurd > 0)
         warnings.push_back(fmt::format("{}: {} with infinite or absurd coordinates (beyond 1e30), treated as invalid.",
                                        file.string(), counted(odd.absurd, "point")));
-    if (odd.left_out > 0)
+    if (odd.splats)
+        warnings.push_back(fmt::format("{}: {} Gaussian splats, taken for points at their centres; {} of them, of an "
+                                       "opacity below {:g}, are left out, without visibility{}.",
+                                       file.string(), odd.all, odd.left_out, least_opacity,
+                                       odd.translucent > 0 ? fmt::format("; {} of an opacity below {:g} occlude as "
+                                                                         "solid ones do",
+                                                                         odd.translucent, solid_opacity)
+                                                           : ""));
+    else if (odd.left_out > 0)
         warnings.push_back(fmt::format("{}: {} marked as withheld or as noise: left out, without visibility.",
                                        file.string(), counted(odd.left_out, "point")));
     if (odd.all == 0)
@@ -167,8 +182,11 @@ double colour_step_in(const CloudRecords& records, const std::array<std::size_t,
 std::vector<cv::Vec3b> colours_of(const CloudRecords& records) {
     const ColourFields fields = colour_fields(records);
     std::vector<cv::Vec3b> colours;
-    if (!fields.packed && !fields.bgr)
+    if (!fields.packed && !fields.bgr) {
+        if (const auto splats = splat_fields(records))
+            return colours_of(records, *splats);
         return colours;
+    }
     const double step = fields.packed ? 1 : colour_step_in(records, *fields.bgr);
     colours.reserve(records.point_count);
     for (std::size_t i = 0; i < records.point_count; ++i) {
@@ -480,7 +498,8 @@ std::string describe(const CloudRecords& records) {
         names += " " + field.name;
     const std::string grid =
         records.grid.height > 1 ? fmt::format(", {}x{} organised", records.grid.width, records.grid.height) : "";
-    return fmt::format("{} {}, {}{}, fields{}{}", kind, encoding_name(records), counted(records.point_count, "point"),
+    const char* const what = splat_fields(records) ? "Gaussian splat" : "point";
+    return fmt::format("{} {}, {}{}, fields{}{}", kind, encoding_name(records), counted(records.point_count, what),
                        grid, names, records.unit.empty() ? "" : ", in " + records.unit);
 }
 

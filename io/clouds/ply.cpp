@@ -358,6 +358,8 @@ void pass_over(BodyWalk& walk, const Element& element, const PlyHeader& header, 
     }
 }
 
+bool is_packed_splat(const CloudField& property) { return property.name == "packed_position"; }
+
 const Element& vertex_element(const PlyHeader& header, const fs::path& file) {
     const Element* vertex = nullptr;
     for (const Element& element : header.elements) {
@@ -372,6 +374,10 @@ const Element& vertex_element(const PlyHeader& header, const fs::path& file) {
     for (const auto* name : {"x", "y", "z"}) {
         const bool there = std::any_of(vertex->properties.begin(), vertex->properties.end(),
                                        [&](const CloudField& p) { return is_named(p, name) && !p.list_length; });
+        if (!there && std::ranges::any_of(vertex->properties, is_packed_splat))
+            throw Error(fmt::format("{}: Gaussian splats, packed as PlayCanvas and SuperSplat do (packed_position); "
+                                    "expected plain ones: export them as PLY that is not compressed",
+                                    at_line(file, vertex->line)));
         if (!there)
             throw Error(fmt::format("{}: element vertex has no property {}", at_line(file, vertex->line), name));
     }
