@@ -289,10 +289,11 @@ class DepthFrames {
 
     [[nodiscard]] Frame frame(std::size_t index) const {
         auto* values = static_cast<std::byte*>(const_cast<void*>(depth_.values)); // cv::Mat has no const view
-        const cv::Mat stored(size(), depth_.type == SCANSHADE_UINT16 ? CV_16UC1 : CV_32FC1,
-                             values + static_cast<std::int64_t>(index) * image_bytes_,
-                             static_cast<std::size_t>(row_bytes_));
         Frame frame;
+        const cv::Mat stored = looking_along_z({size(), depth_.type == SCANSHADE_UINT16 ? CV_16UC1 : CV_32FC1,
+                                                values + static_cast<std::int64_t>(index) * image_bytes_,
+                                                static_cast<std::size_t>(row_bytes_)},
+                                               frame.warnings);
         frame.name = listing_.entries[index].name;
         frame.camera = camera_;
         frame.depth_m = depth_in_metres(stored, encoding_);

@@ -91,8 +91,9 @@ void tell_guesses(const Capture& capture, double beyond, double all, Frame& fram
                                              100 * beyond / all, capture.guessed_beyond_m));
 }
 
-void load_depth(const Capture& capture, const CaptureEntry& entry, const cv::Mat& stored, Frame& frame,
+void load_depth(const Capture& capture, const CaptureEntry& entry, const cv::Mat& as_stored, Frame& frame,
                 bool with_colour) {
+    const cv::Mat stored = looking_along_z(as_stored, frame.warnings);
     require_memory(stored.total() * sizeof(float),
                    fmt::format("{}: a depth image of {} pixels", entry.depth, size_text(stored.size())));
     const DepthEncoding encoding = encoding_of(capture, entry);

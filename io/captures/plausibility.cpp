@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <limits>
 #include <numeric>
 
 namespace scanshade {
@@ -334,7 +335,38 @@ std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& im
     return doubts;
 }
 
+/// Of floats but 0, backgrounds, infinities and NaN.
+struct Signs {
+    std::size_t positive = 0, negative = 0;
+    float least = 0, nearest = std::numeric_limits<float>::lowest(); ///< of the negative ones
+};
+
+Signs signs_of(const cv::Mat1f& stored) {
+    Signs signs;
+    for (const float value : stored) {
+        signs.positive += value > 0 && std::isfinite(value) && !is_background(value);
+        if (!(value < 0 && std::isfinite(value)))
+            continue;
+        ++signs.negative;
+        signs.least = std::min(signs.least, value);
+        signs.nearest = std::max(signs.nearest, value);
+    }
+    return signs;
+}
+
 } // namespace
+
+cv::Mat looking_along_z(const cv::Mat& stored, std::vector<std::string>& warnings) {
+    if (stored.type() != CV_32FC1)
+        return stored;
+    const Signs signs = signs_of(cv::Mat1f(stored));
+    if (signs.positive > 0 || signs.negative == 0 || signs.least == signs.nearest)
+        return stored;
+    warnings.push_back(fmt::format("all depths are negative ({:.3g} .. {:.3g}), as z of cameras that look along -z "
+                                   "(OpenGL): taken without their signs.",
+                                   signs.least, signs.nearest));
+    return -stored;
+}
 
 DepthTable depth_table(const DepthEncoding& encoding) {
     cv::Mat1w values(1, 1 << 16);

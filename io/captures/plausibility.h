@@ -10,6 +10,10 @@
 
 namespace scanshade {
 
+/// Floats that are all negative, as z of cameras that look along -z (OpenGL, Blender), with their signs turned, and a
+/// warning. A single number in all pixels is a mark of holes and stays; so does everything else.
+[[nodiscard]] cv::Mat looking_along_z(const cv::Mat& stored, std::vector<std::string>& warnings);
+
 /// How 16-bit depth values read in metres: 65536 of them, by value.
 using DepthTable = cv::Mat1f;
 [[nodiscard]] DepthTable depth_table(const DepthEncoding& encoding);

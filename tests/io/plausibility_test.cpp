@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
 namespace scanshade {
@@ -57,6 +58,36 @@ TEST(plausibility, floats_in_millimetres_are_told_with_the_scale_that_suits_them
     const auto told = doubts_about(depth_in_metres(millimetres, metres), millimetres, metres);
     EXPECT_TRUE(warned(told, "With --depth-scale 1000 the median is 2.")) << tests::joined(told);
 }
+
+struct Signed {
+    const char* name;
+    std::vector<float> values; ///< four pixels
+    std::vector<float> taken;
+};
+void PrintTo(const Signed& row, std::ostream* to) { *to << row.name; }
+class SignsOfDepth : public testing::TestWithParam<Signed> {};
+
+TEST_P(SignsOfDepth, are_turned_where_all_are_negative_and_differ) {
+    constexpr float infinite = std::numeric_limits<float>::infinity();
+    std::vector<std::string> warnings;
+    const cv::Mat1f taken = looking_along_z(cv::Mat1f(2, 2, const_cast<float*>(GetParam().values.data())), warnings);
+    const bool turned = GetParam().taken != GetParam().values;
+    EXPECT_EQ(warnings.size(), turned ? 1U : 0U);
+    EXPECT_EQ(std::vector<float>(taken.begin(), taken.end()), GetParam().taken);
+    EXPECT_EQ(depth_in_metres(cv::Mat1f(1, 1, -infinite), depth_encoding("m", ""))(0), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, SignsOfDepth,
+                         testing::Values(Signed{"opengl", {-1, -2, -3, -1.5F}, {1, 2, 3, 1.5F}},
+                                         Signed{"with_holes",
+                                                {0, -2, -std::numeric_limits<float>::infinity(), -1.5F},
+                                                {0, 2, std::numeric_limits<float>::infinity(), 1.5F}},
+                                         Signed{"with_a_background", {-1e10F, -2, -1, -1}, {1e10F, 2, 1, 1}},
+                                         Signed{"a_mark_of_holes", {-1, -1, -1, -1}, {-1, -1, -1, -1}},
+                                         Signed{"a_mark_beside_depth", {-1, 2, 3, -1}, {-1, 2, 3, -1}},
+                                         Signed{"noise_below_zero", {-0.01F, -0.02F, 3, 2}, {-0.01F, -0.02F, 3, 2}},
+                                         Signed{"holes", {0, 0, 0, 0}, {0, 0, 0, 0}}),
+                         [](const auto& info) { return std::string(info.param.name); });
 
 /// Every row whose remainder is `copied` becomes a copy of the row above.
 cv::Mat1w with_copies(cv::Mat1w stored, int every, int copied) {
