@@ -26,6 +26,8 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
     const bool y_was_up = settle_camera(listing, options);
     if (listing.find_poses)
         listing.find_poses(capture, capture.pose_time_offset_s);
+    if (options.poses.empty() && !listing.may_stand_still)
+        leave_out_equal_poses(capture);
     if (y_was_up)
         turn_poses_y_down(capture);
     if (!options.colour.empty())

@@ -14,6 +14,9 @@ void take_colour(Capture& capture, const std::filesystem::path& colour);
 /// The same poses for cameras with y downwards, in a world whose y is turned as well: mirrored twice, they stay
 /// rotations.
 void turn_poses_y_down(Capture& capture);
+/// Takes away poses that are all the same, which recorders write where they do not track the camera, and warns. Of a
+/// camera that stands still they would tell nothing more.
+void leave_out_equal_poses(Capture& capture);
 /// Replaces the recording's poses by those of a file. Throws Error if no frame has one.
 void take_poses(Capture& capture, const CaptureOptions& options);
 /// Warns of what looks like poses or cameras in a folder that was read as a generic one.

@@ -10,6 +10,7 @@
 #include <cctype>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <optional>
 #include <set>
 
 namespace scanshade {
@@ -60,6 +61,30 @@ void turn_poses_y_down(Capture& capture) {
         entry.motion->rotation_per_s = -(mirror * entry.motion->rotation_per_s).eval();
         entry.motion->translation_per_s = (mirror * entry.motion->translation_per_s).eval();
     }
+}
+
+void leave_out_equal_poses(Capture& capture) {
+    constexpr std::size_t enough = 3; // two frames may be of one place
+    const CaptureEntry* first = nullptr;
+    std::size_t posed = 0;
+    for (const CaptureEntry& entry : capture.entries) {
+        if (!entry.world_from_camera)
+            continue;
+        first = first ? first : &entry;
+        ++posed;
+        if (entry.world_from_camera->matrix() != first->world_from_camera->matrix())
+            return;
+    }
+    if (posed < enough)
+        return;
+    for (CaptureEntry& entry : capture.entries) {
+        entry.world_from_camera = std::nullopt;
+        entry.motion = std::nullopt;
+    }
+    capture.warnings.push_back(
+        fmt::format("all {} poses are equal: none were recorded, or the camera stood still. They "
+                    "are not used; --poses FILE gives others.",
+                    posed));
 }
 
 void take_poses(Capture& capture, const CaptureOptions& options) {

@@ -31,6 +31,8 @@ struct Listing {
     /// poses or cameras there is named in a warning.
     std::vector<std::string> used = {};
     bool generic = false; ///< that it is one; from the table
+    /// The poses are those of a robot's parts, which are known where it stands still, too.
+    bool may_stand_still = false;
 };
 
 // Each returns nothing when the folder is not in its layout, and throws Error when it is but cannot be used.

@@ -477,6 +477,7 @@ Listing list_ros(const fs::path& path, const CaptureOptions& options) {
 Listing list_ros(const fs::path& path, const std::vector<fs::path>& files, const CaptureOptions& options) {
     const auto recording = std::make_shared<const Recording>(files);
     Listing listing;
+    listing.may_stand_still = true;
     Capture& capture = listing.capture;
     capture.warnings = recording->warnings;
     const std::uint32_t depth = depth_topic(*recording, options.topic, path, capture.warnings);
