@@ -58,12 +58,14 @@ bool is_json(const CameraText& text) {
     return first_in(text) == '{' || (first_in(text) == '[' && lower_extension(text.file) == ".json");
 }
 bool is_xml(const CameraText& text) { return first_in(text) == '<'; }
+bool has_keys(const CameraText& text) { return has_camera_keys(text.lines); }
 /// YAML has keys at the start of lines. A file with such a key that is not JSON counts as YAML.
 bool is_yaml(const CameraText& text) {
     if (text.bytes.starts_with("%YAML") || text.bytes.starts_with("---"))
         return true;
-    return std::ranges::any_of(std::array{"camera_matrix:", "cam0:", "image_width:", "distortion_model:"},
-                               [&](const char* key) { return text.bytes.find(key) != std::string::npos; });
+    return std::ranges::any_of(
+        std::array{"camera_matrix:", "Camera_Matrix:", "cam0:", "image_width:", "distortion_model:"},
+        [&](const char* key) { return text.bytes.find(key) != std::string::npos; });
 }
 bool is_info(const CameraText& text) { return text.bytes.find("m_calibration") != std::string::npos; }
 bool is_scan(const CameraText& text) { return text.bytes.find("fx_depth") != std::string::npos; }
@@ -72,6 +74,7 @@ bool is_anything(const CameraText&) { return true; }
 
 CameraFile read_json(const CameraText& text) { return camera_from_json(text.file, text.bytes); }
 CameraFile read_xml(const CameraText& text) { return camera_from_xml(text.file, text.bytes); }
+CameraFile read_lines(const CameraText& text) { return camera_from_lines(text.file, text.lines); }
 CameraFile read_yaml(const CameraText& text) { return camera_from_yaml(text.file, text.bytes); }
 CameraFile read_info(const CameraText& text) { return camera_from_info(text.file, text.lines); }
 CameraFile read_scan(const CameraText& text) { return camera_from_scan(text.file, text.lines); }
@@ -91,7 +94,7 @@ constexpr CameraFormatRow formats[] = {
      .written = [](const CameraFile& file, const Quality& quality) { return camera_as_json(file, quality.details); }},
     {.name = "open3d",
      .recognised = "JSON with `intrinsic_matrix`",
-     .content = "a pinhole",
+     .content = "a pinhole; also `K` or `camera_matrix`, row by row",
      .is = is_json,
      .read = read_json,
      .extension = ".json",
@@ -102,8 +105,13 @@ constexpr CameraFormatRow formats[] = {
      .content = "a pinhole and the depth unit, beside `.pclzf`",
      .is = is_xml,
      .read = read_xml},
+    {.name = "keys",
+     .recognised = "lines with `fx`, as `fx = 525`, `fx: 525` or `Camera.fx: 525`",
+     .content = "lens and depth unit, as of ORB-SLAM's settings and RealSense Viewer's tables",
+     .is = has_keys,
+     .read = read_lines},
     {.name = "opencv",
-     .recognised = "YAML with `camera_matrix` and `distortion_coefficients`",
+     .recognised = "YAML or XML with `camera_matrix` and `distortion_coefficients`, also by their other names",
      .content = "lens, fisheye",
      .is = is_yaml,
      .read = read_yaml,
@@ -119,7 +127,7 @@ constexpr CameraFormatRow formats[] = {
      .format = CameraFormat::ros,
      .written = [](const CameraFile& file, const Quality&) { return camera_as_ros(file.camera); }},
     {.name = "kalibr",
-     .recognised = "YAML with `cam0`",
+     .recognised = "YAML with `cam0`, or one such camera alone, as in EuRoC's `sensor.yaml`",
      .content = "lens (radtan), fisheye (equidistant); `cam1` as the colour camera",
      .is = is_yaml,
      .read = read_yaml,

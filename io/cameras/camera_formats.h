@@ -5,6 +5,7 @@
 #include "io/text.h"
 
 #include <array>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -24,6 +25,13 @@ void check_numbers(const std::filesystem::path& file, const Pinhole& camera, con
 
 // Each throws Error naming file and place.
 [[nodiscard]] CameraFile camera_from_json(const std::filesystem::path& file, const std::string& text);
+/// Of an object as camera_from_json() reads it, where sizes may be missing.
+[[nodiscard]] CameraFile camera_from_keys(const std::filesystem::path& file, const nlohmann::json& object);
+/// Lines of a key and a number, whatever stands between them: fx, fy, cx or ppx ..., as ORB-SLAM's settings have them
+/// behind "Camera.", and RealSense Viewer's tables with other words. Of several sections of an INI file none is chosen.
+[[nodiscard]] CameraFile camera_from_lines(const std::filesystem::path& file, const std::vector<TextLine>& lines);
+/// Whether one of them says fx.
+[[nodiscard]] bool has_camera_keys(const std::vector<TextLine>& lines);
 [[nodiscard]] CameraFile camera_from_yaml(const std::filesystem::path& file, const std::string& text);
 [[nodiscard]] CameraFile camera_from_xml(const std::filesystem::path& file, const std::string& text);
 [[nodiscard]] CameraFile camera_from_info(const std::filesystem::path& file, const std::vector<TextLine>& lines);

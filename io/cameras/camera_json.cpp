@@ -179,13 +179,46 @@ Distortion lens_of(const fs::path& file, const Json& object) {
     return brown_conrady(coefficients);
 }
 
-Camera one_camera(const fs::path& file, const Json& object) {
+/// A matrix row by row, as lists of lists, as nine numbers, or as OpenCV's "data".
+constexpr std::array matrices{"K", "camera_matrix", "cameraMatrix", "intrinsics", "intrinsic"};
+
+const Json* matrix_in(const Json& object) {
+    for (const char* key : matrices)
+        if (const auto found = object.find(key); found != object.end()) {
+            const Json& matrix = found->is_object() && found->contains("data") ? (*found)["data"] : *found;
+            if (matrix.is_array())
+                return &matrix;
+        }
+    return nullptr;
+}
+
+Pinhole from_rows(const fs::path& file, const Json& matrix) {
+    std::vector<double> m;
+    const auto add = [&](const Json& value) { m.push_back(number_of(file, value, "camera matrix")); };
+    for (const Json& row : matrix)
+        if (row.is_array())
+            std::ranges::for_each(row, add);
+        else
+            add(row);
+    if (m.size() != 9 || m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1)
+        refuse_camera(file, "no camera matrix row by row: expected fx 0 cx, 0 fy cy, 0 0 1");
+    const Pinhole camera{m[0], m[4], m[2], m[5], {}};
+    check_numbers(file, camera, {"fx", "fy", "cx", "cy"});
+    return camera;
+}
+
+enum class Sizes { needed, optional };
+
+Camera one_camera(const fs::path& file, const Json& object, Sizes sizes = Sizes::needed) {
     Camera camera;
+    const Json* const matrix = matrix_in(object);
     camera.pinhole = object.contains("intrinsic_matrix")
                          ? from_columns(file, numbers_of(file, object, "intrinsic_matrix", 9))
-                         : from_keys(file, object);
-    camera.pinhole.size = {size_of(file, object, either(object, "width", "w")),
-                           size_of(file, object, either(object, "height", "h"))};
+                     : matrix && !object.contains("fx") ? from_rows(file, *matrix)
+                                                        : from_keys(file, object);
+    const std::string width = either(object, "width", "w"), height = either(object, "height", "h");
+    if ((sizes == Sizes::needed && !matrix) || object.contains(width) || object.contains(height))
+        camera.pinhole.size = {size_of(file, object, width), size_of(file, object, height)};
     camera.distortion = lens_of(file, object);
     return camera;
 }
@@ -202,8 +235,9 @@ DepthCorrection correction_of(const fs::path& file, const Json& object) {
     return correction;
 }
 
-constexpr std::array depth_scales{"depth_scale", "png_depth_scale", "depth_factor", "integer_depth_scale",
-                                  "depth_unit_scale_factor"};
+constexpr const char* units_per_metre = "depthmapfactor"; // ORB-SLAM's, as camera_from_lines() spells it
+constexpr std::array depth_scales{units_per_metre, "depth_scale",         "png_depth_scale",
+                                  "depth_factor",  "integer_depth_scale", "depth_unit_scale_factor"};
 
 /// The unit of depths by a key of others, which mean different things by the same name: metres per unit (librealsense
 /// 0.001, nerfstudio), millimetres per unit (BOP 0.1 and 1), units per metre (Open3D 1000, NICE-SLAM 6553.5). The
@@ -219,7 +253,9 @@ void take_depth_scale(const fs::path& file, const Json& object, CameraFile& resu
             result.warnings.push_back(fmt::format("{}: \"{}\" {:g} was taken as {}: {:g} units per metre.",
                                                   file.string(), key, scale, meaning, units));
         };
-        if (result.depth_units_per_metre || !(scale > 0) || (scale > 10 && scale < 100))
+        if (key == units_per_metre && scale > 0 && !result.depth_units_per_metre)
+            take(scale, "units per metre");
+        else if (result.depth_units_per_metre || !(scale > 0) || (scale > 10 && scale < 100))
             result.warnings.push_back(fmt::format("{}: \"{}\" {:g} is not used.", file.string(), key, scale));
         else if (scale <= 0.01)
             take(1 / scale, "metres per unit");
@@ -236,8 +272,8 @@ void name_unused(const fs::path& file, const Json& object, CameraFile& result) {
         "intrinsic_matrix",  "fx", "fy", "cx", "cy", "ppx", "ppy", "width", "height", "w", "h", "depth_units_per_metre",
         "pose_time_offset_s"};
     const auto used = [&](const std::string& key) {
-        return std::ranges::count(others, key) + std::ranges::count(lists, key) + std::ranges::count(numbers, key) +
-                   std::ranges::count(depth_scales, key) >
+        return std::ranges::count(others, key) + std::ranges::count(matrices, key) + std::ranges::count(lists, key) +
+                   std::ranges::count(numbers, key) + std::ranges::count(depth_scales, key) >
                0;
     };
     std::vector<std::string> unused;
@@ -272,7 +308,7 @@ CameraFile camera_from_json(const fs::path& file, const std::string& text) {
     const Json object = parse(file, text);
     if (!object.is_object())
         refuse_camera(file, "expected a JSON object that describes a camera");
-    if (!object.contains("intrinsic_matrix") && !object.contains("fx"))
+    if (!object.contains("intrinsic_matrix") && !object.contains("fx") && !matrix_in(object))
         refuse_camera(file, "\"intrinsic_matrix\" (Open3D's layout) and \"fx\" (ours) are both missing");
     CameraFile result;
     result.camera = one_camera(file, object);
@@ -295,6 +331,14 @@ CameraFile camera_from_json(const fs::path& file, const std::string& text) {
         result.pose_time_offset_s = number_of(file, object["pose_time_offset_s"], "pose_time_offset_s");
     if (object.contains("colour"))
         result.colour = during("\"colour\"", [&] { return secondary_camera(file, object["colour"]); });
+    return result;
+}
+
+CameraFile camera_from_keys(const fs::path& file, const Json& object) {
+    CameraFile result;
+    result.camera = one_camera(file, object, Sizes::optional);
+    take_depth_scale(file, object, result);
+    name_unused(file, object, result);
     return result;
 }
 

@@ -1,10 +1,13 @@
-// The cameras of PCL's recordings: XML with the two roots <rgb> and <depth>, as pcl/io/lzf_image_io.h writes it.
+// Cameras in XML: those of PCL's recordings, with the two roots <rgb> and <depth>, as pcl/io/lzf_image_io.h writes it,
+// and OpenCV's.
 #include "io/cameras/camera_formats.h"
 #include "projection/base/error.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <pugixml.hpp>
 
 namespace scanshade {
@@ -40,6 +43,31 @@ bool same_numbers(const Pinhole& a, const Pinhole& b) {
     return a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy;
 }
 
+/// OpenCV writes the same in XML and in YAML: a matrix is an element whose <data> are numbers between blanks.
+std::string as_yaml(const pugi::xml_node& storage) {
+    std::string yaml;
+    const auto quoted = [](std::string_view word) {
+        std::string text(word);
+        std::erase_if(text, [](char c) { return c == '"' || c == '\\'; });
+        return '"' + text + '"';
+    };
+    for (const pugi::xml_node& element : storage.children()) {
+        const pugi::xml_node data = element.child("data");
+        const std::string_view text = data ? data.child_value() : element.child_value();
+        std::vector<std::string> values;
+        std::string line(text);
+        std::ranges::replace_if(
+            line, [](unsigned char c) { return std::isspace(c) != 0; }, ' ');
+        for (const std::string_view word : words(line))
+            values.push_back(quoted(word));
+        if (data)
+            yaml += fmt::format("{}: [{}]\n", quoted(element.name()), fmt::join(values, ", "));
+        else if (values.size() == 1)
+            yaml += fmt::format("{}: {}\n", quoted(element.name()), values[0]);
+    }
+    return yaml;
+}
+
 } // namespace
 
 CameraFile camera_from_xml(const fs::path& file, const std::string& text) {
@@ -49,9 +77,12 @@ CameraFile camera_from_xml(const fs::path& file, const std::string& text) {
             1 + std::ranges::count(std::string_view(text).substr(0, static_cast<std::size_t>(parsed.offset)), '\n');
         throw Error(fmt::format("{}: {}, expected XML", at_line(file, static_cast<int>(line)), parsed.description()));
     }
+    if (const pugi::xml_node storage = document.child("opencv_storage"))
+        return camera_from_yaml(file, as_yaml(storage));
     const pugi::xml_node depth = document.child("depth"), rgb = document.child("rgb");
     if (!depth)
-        refuse_camera(file, "\"depth\" is missing, expected PCL's <rgb> and <depth>");
+        refuse_camera(file, fmt::format("XML of <{}>: expected OpenCV's <opencv_storage>, or PCL's <rgb> and <depth>",
+                                        document.document_element().name()));
     CameraFile result;
     result.camera.pinhole = pinhole_of(file, depth);
     const char* const unit = "z_multiplication_factor";

@@ -3,9 +3,11 @@
 #include "io/cameras/camera_formats.h"
 #include "projection/base/error.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <initializer_list>
 #include <yaml-cpp/yaml.h>
 
 namespace scanshade {
@@ -32,6 +34,21 @@ std::string word_of(const YAML::Node& parent, const std::string& key) {
 
 double number_of(const YAML::Node& node) {
     return node.IsScalar() ? number(node.Scalar()).value_or(std::nan("")) : std::nan("");
+}
+
+/// The first of these keys that is there, or the first one.
+std::string first_of(const YAML::Node& root, std::initializer_list<const char*> keys) {
+    const auto* const found = std::ranges::find_if(keys, [&](const char* key) { return root[key].IsDefined(); });
+    return found == keys.end() ? *keys.begin() : *found;
+}
+
+/// OpenCV's samples and programs after them name the same things in several ways.
+std::string matrix_key(const YAML::Node& root) {
+    return first_of(root, {"camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "K", "M1"});
+}
+std::string lens_key(const YAML::Node& root) {
+    return first_of(root, {"distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "DistCoeffs",
+                           "dist_coeffs", "distortion_coeffs", "D", "D1"});
 }
 
 /// Numbers of a list, or of a matrix given as rows, cols, data.
@@ -98,11 +115,12 @@ Distortion polynomial(const fs::path& file, const std::string& key, const std::v
 /// OpenCV's and ROS's: both say camera_matrix and distortion_coefficients.
 CameraFile from_matrices(const fs::path& file, const YAML::Node& root) {
     CameraFile result;
-    result.camera.pinhole = from_matrix(file, numbers_of(file, root, "camera_matrix", 9));
-    const std::string width = word_of(root, "image_width"), height = word_of(root, "image_height");
+    result.camera.pinhole = from_matrix(file, numbers_of(file, root, matrix_key(root), 9));
+    const std::string width = word_of(root, first_of(root, {"image_width", "image_Width", "width"})),
+                      height = word_of(root, first_of(root, {"image_height", "image_Height", "height"}));
     if (!width.empty() || !height.empty())
         result.camera.pinhole.size = checked_size(file, number(width).value_or(0), number(height).value_or(0));
-    const std::string key = "distortion_coefficients";
+    const std::string key = lens_key(root);
     if (!root[key].IsDefined())
         return result;
     const std::string said = word_of(root, "distortion_model"), model = said.empty() ? "plumb_bob" : said;
@@ -131,10 +149,11 @@ Camera of_chain(const fs::path& file, const YAML::Node& node) {
     const auto size = numbers_of(file, node, "resolution", 2);
     camera.pinhole.size = checked_size(file, size[0], size[1]);
     const std::string said = word_of(node, "distortion_model"), lens = said.empty() ? "none" : said;
+    const std::string key = node["distortion_coeffs"].IsDefined() ? "distortion_coeffs" : lens_key(node);
     if (lens == "equidistant")
-        camera.distortion = fisheye(file, "distortion_coeffs", numbers_of(file, node, "distortion_coeffs"));
-    else if (lens == "radtan")
-        camera.distortion = polynomial(file, "distortion_coeffs", numbers_of(file, node, "distortion_coeffs"));
+        camera.distortion = fisheye(file, key, numbers_of(file, node, key));
+    else if (lens == "radtan" || lens == "radial-tangential")
+        camera.distortion = polynomial(file, key, numbers_of(file, node, key));
     else if (lens != "none")
         refuse_camera(file,
                       fmt::format("\"distortion_model\" is {}, expected radtan, equidistant or none", in_quotes(lens)));
@@ -189,10 +208,15 @@ CameraFile camera_from_yaml(const fs::path& file, const std::string& text) {
     if (!root.IsMap())
         refuse_camera(file, "not a map of keys and values");
     try {
-        if (root["camera_matrix"].IsDefined())
+        if (root[matrix_key(root)].IsDefined())
             return from_matrices(file, root);
         if (root["cam0"].IsDefined())
             return from_camchain(file, root);
+        if (root["intrinsics"].IsDefined() && root["resolution"].IsDefined()) { // EuRoC's sensor.yaml: one of a chain
+            CameraFile result;
+            result.camera = of_chain(file, root);
+            return result;
+        }
     } catch (const YAML::Exception& failure) { // a node of the wrong kind
         refuse_camera(file, failure.msg);
     }

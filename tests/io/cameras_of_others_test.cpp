@@ -1,0 +1,147 @@
+// Camera files as other programs write them: other names for the same numbers, XML, settings, tables, printed matrices.
+#include "io/cameras/camera_file.h"
+#include "tests/support/files.h"
+
+#include <gtest/gtest.h>
+
+namespace scanshade {
+namespace {
+
+using namespace tests;
+
+struct OthersCamera {
+    const char* name; ///< of the file
+    const char* text;
+    cv::Size size = {};
+    double k1 = 0;
+    double units_per_metre = 0;
+    const char* warning = nullptr;
+};
+
+void PrintTo(const OthersCamera& row, std::ostream* to) { *to << row.name; }
+
+class CamerasOfOthers : public testing::TestWithParam<OthersCamera> {};
+
+TEST_P(CamerasOfOthers, are_read) {
+    const OthersCamera& row = GetParam();
+    const TemporaryFolder folder;
+    const CameraFile found = read_camera_file(write_file(folder / row.name, row.text));
+    const Pinhole& pinhole = found.camera.pinhole;
+    EXPECT_EQ(pinhole.fx, 140);
+    EXPECT_EQ(pinhole.fy, 141);
+    EXPECT_EQ(pinhole.cx, 79.5);
+    EXPECT_EQ(pinhole.cy, 59.5);
+    EXPECT_EQ(pinhole.size, row.size);
+    EXPECT_EQ(found.camera.distortion.k1, row.k1);
+    EXPECT_EQ(found.depth_units_per_metre.value_or(0), row.units_per_metre);
+    EXPECT_EQ(found.warnings.empty(), row.warning == nullptr) << joined(found.warnings);
+    EXPECT_TRUE(says(joined(found.warnings), row.warning ? row.warning : ""));
+}
+
+const cv::Size known(160, 120);
+constexpr const char* opencv_xml =
+    "<?xml version=\"1.0\"?>\n<opencv_storage>\n<image_width>160</image_width><image_height>120</image_height>\n"
+    "<camera_matrix type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><dt>d</dt>\n"
+    "<data>140. 0. 79.5 0. 1.41e+02\n 59.5 0. 0. 1.</data></camera_matrix>\n"
+    "<distortion_coefficients type_id=\"opencv-matrix\"><rows>5</rows><cols>1</cols><dt>d</dt>\n"
+    "<data>0.1 0. 0. 0. 0.</data></distortion_coefficients>\n</opencv_storage>\n";
+
+INSTANTIATE_TEST_SUITE_P(
+    Of, CamerasOfOthers,
+    testing::Values(
+        OthersCamera{"opencv.xml", opencv_xml, known, 0.1},
+        OthersCamera{"old_opencv.xml",
+                     "<opencv_storage><Camera_Matrix><data>140 0 79.5 0 141 59.5 0 0 1</data></Camera_Matrix>"
+                     "</opencv_storage>"},
+        OthersCamera{"old_opencv.yml",
+                     "%YAML:1.0\n---\nimage_Width: 160\nimage_Height: 120\nCamera_Matrix: !!opencv-matrix\n   rows: "
+                     "3\n   cols: 3\n"
+                     "   dt: d\n   data: [ 140., 0., 79.5, 0., 141., 59.5, 0., 0., 1. ]\n"
+                     "Distortion_Coefficients: !!opencv-matrix\n   rows: 4\n   cols: 1\n   dt: d\n   data: [ 0.1, 0., "
+                     "0., 0. ]\n",
+                     known, 0.1},
+        OthersCamera{"stereo.yml", "%YAML:1.0\n---\nM1: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
+                                   "   data: [ 140., 0., 79.5, 0., 141., 59.5, 0., 0., 1. ]\n"},
+        OthersCamera{
+            "euroc_sensor.yaml",
+            "sensor_type: camera\nintrinsics: [140, 141, 79.5, 59.5]\nresolution: [160, 120]\ncamera_model: pinhole\n"
+            "distortion_model: radial-tangential\ndistortion_coefficients: [0.1, 0, 0, 0]\n",
+            known, 0.1},
+        OthersCamera{"orb_slam2.yaml",
+                     "%YAML:1.0\n# Camera\nCamera.fx: 140.0\nCamera.fy: 141.0\nCamera.cx: 79.5\nCamera.cy: "
+                     "59.5\nCamera.k1: 0.1\n"
+                     "Camera.k2: 0.0\nCamera.p1: 0.0\nCamera.p2: 0.0\nCamera.width: 160\nCamera.height: 120\n"
+                     "DepthMapFactor: 5000.0\n",
+                     known, 0.1, 5000, "taken as units per metre"},
+        OthersCamera{"orb_slam3.yaml",
+                     "%YAML:1.0\nCamera.type: \"PinHole\"\nCamera1.fx: 140\nCamera1.fy: 141\nCamera1.cx: "
+                     "79.5\nCamera1.cy: 59.5\n"
+                     "RGBD.DepthMapFactor: 1.0\n",
+                     {},
+                     0,
+                     1,
+                     "taken as units per metre"},
+        OthersCamera{"unused.yaml",
+                     "fx: 140\nfy: 141\ncx: 79.5\ncy: 59.5\nbaseline: 0.05\n",
+                     {},
+                     0,
+                     0,
+                     "not used: \"baseline\""},
+        OthersCamera{"plain.txt", "fx = 140\nfy = 141\ncx = 79.5 # of depth\ncy = 59.5\nwidth = 160\nheight = 120\n",
+                     known},
+        OthersCamera{"blanks.txt", "fx 140\nfy 141\ncx 79.5\ncy 59.5\n"},
+        OthersCamera{"viewer.csv",
+                     "Stream,Depth\nFormat,Z16\nResolution x,160\nResolution y,120\nIntrinsics:,\nFx,140.0\n"
+                     "Fy,141.0\nPPx,79.5\nPPy,59.5\nDistortion,Brown Conrady\n",
+                     known},
+        OthersCamera{"rows.json", R"({"K": [[140,0,79.5],[0,141,59.5],[0,0,1]], "width": 160, "height": 120})", known},
+        OthersCamera{"flat.json",
+                     R"({"camera_matrix": {"rows": 3, "data": [140,0,79.5,0,141,59.5,0,0,1]}, "dist": [0.1,0,0,0,0]})",
+                     {},
+                     0.1},
+        OthersCamera{"mark.json",
+                     "\xEF\xBB\xBF{\"fx\": 140, \"fy\": 141, \"cx\": 79.5, \"cy\": 59.5, \"w\": 160, \"h\": 120}",
+                     known},
+        OthersCamera{
+            "librealsense.json",
+            R"({"fx": 140, "fy": 141, "ppx": 79.5, "ppy": 59.5, "width": 160, "height": 120, "depth_scale": 0.001})",
+            known, 0, 1000, "metres per unit"},
+        OthersCamera{"scannet.txt", "140 0 79.5 0\n0 141 59.5 0\n0 0 1 0\n0 0 0 1\n"},
+        OthersCamera{"one_line.txt", "140, 0, 79.5, 0, 141, 59.5, 0, 0, 1"},
+        OthersCamera{"printed.txt", "[[140.    0.   79.5]\n [  0.  141.   59.5]\n [  0.    0.    1. ]]\n"},
+        OthersCamera{"four.txt", "140 141 79.5 59.5\n"}),
+    [](const auto& info) {
+        std::string name = info.param.name;
+        std::ranges::replace(name, '.', '_');
+        return name;
+    });
+
+TEST(CamerasOfOthersRefused, say_what_they_are_and_what_was_expected) {
+    const TemporaryFolder folder;
+    const auto complaint = [&](const char* name, const char* text) {
+        return refusal([&] { (void)read_camera_file(write_file(folder / name, text)); });
+    };
+    EXPECT_TRUE(
+        says(complaint("SN1.conf", "[LEFT_CAM_VGA]\nfx=140.0\nfy=141.0\ncx=79.5\ncy=59.5\n[LEFT_CAM_HD]\nfx=700\n"),
+             "an INI file, as of ZED cameras, with a camera for each section: none is chosen. [LEFT_CAM_VGA] would be "
+             "--camera 140.0,141.0,79.5,59.5"));
+    EXPECT_TRUE(
+        says(complaint("c.xml", "<calibration><fx>140</fx></calibration>"), "XML of <calibration>: expected OpenCV's"));
+    EXPECT_TRUE(
+        says(complaint("o.xml",
+                       "<opencv_storage><camera_matrix><data>140 0 79.5 0 141</data></camera_matrix></opencv_storage>"),
+             "\"camera_matrix\" has 5 numbers, expected 9"));
+    EXPECT_TRUE(says(
+        complaint(
+            "w.xml",
+            "<opencv_storage><camera_matrix><data>wide 0 79.5 0 141 5 0 0 1</data></camera_matrix></opencv_storage>"),
+        "\"camera_matrix\": value 1 is not a finite number"));
+    EXPECT_TRUE(
+        says(complaint("c.json", R"({"K": [[140,0,0],[0,141,0],[79.5,59.5,1]]})"), "row by row: expected fx 0 cx"));
+    EXPECT_TRUE(says(complaint("k.txt", "fx: 140\nfy: 141\ncx: 79.5\n"), "\"cy\" is missing"));
+    EXPECT_TRUE(says(complaint("n.txt", "fx: 140\nfy: wide\ncx: 79.5\ncy: 1\n"), "\"fy\" is"));
+    EXPECT_TRUE(says(complaint("t.txt", "Camera.fx: 140\nCamera.fx: 150\n"), "line 2: \"fx\" is there twice"));
+}
+
+} // namespace
+} // namespace scanshade
