@@ -1,13 +1,15 @@
-// EXR with OpenEXR, from memory and to memory. Read: one channel of any name, halves and integers as floats. Written:
-// one channel, or three of colour.
+// EXR with OpenEXR, from memory and to memory. Read: one channel of any name, or that of depth among others, halves and
+// integers as floats. Written: one channel, or three of colour.
 #include "io/images/readers.h"
 
 #include "projection/base/error.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cstring>
 #include <exception>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -94,10 +96,36 @@ std::optional<std::uint64_t> expansion(Imf::Compression compression) {
     }
 }
 
+std::string lower(std::string_view text) {
+    std::string result(text);
+    std::ranges::transform(result, result.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return result;
+}
+
+/// The only channel; or else the one that is called Z or depth, alone or in a layer of depth: "Z", "Depth.Z" and
+/// "ViewLayer.Depth.Z" of Blender, "FinalImageWorldDepth.R" of Unreal. Not "Normal.Z". Empty where there is none.
+std::string depth_channel(const Imf::ChannelList& channels) {
+    std::string found;
+    std::size_t count = 0;
+    for (auto channel = channels.begin(); channel != channels.end(); ++channel, ++count) {
+        const std::string name = lower(channel.name());
+        const std::size_t dot = name.rfind('.');
+        const std::string layer = dot == std::string::npos ? "" : name.substr(0, dot), leaf = name.substr(dot + 1);
+        const bool of_depth = layer.find("depth") != std::string::npos;
+        const bool is_depth = leaf == "z" || leaf == "v" || leaf == "r" ? of_depth || (layer.empty() && leaf == "z")
+                                                                        : leaf.find("depth") != std::string::npos;
+        if (is_depth && found.empty())
+            found = channel.name();
+    }
+    return count == 1 ? channels.begin().name() : found;
+}
+
 } // namespace
 
-/// Reads the header by itself, because opening the file allocates the size that it states.
-ImageFacts exr_header(std::string_view bytes, const Path& file) {
+namespace {
+
+/// By itself, because opening the file allocates the size that it states.
+Imf::Header header_of(std::string_view bytes, const Path& file) {
     constexpr std::size_t magic_and_version = 8;
     if (bytes.size() < magic_and_version)
         refuse(file, fmt::format("EXR ends early: {} bytes", bytes.size()));
@@ -109,6 +137,13 @@ ImageFacts exr_header(std::string_view bytes, const Path& file) {
         header.readFrom(source, version);
         header.sanityCheck(Imf::isTiled(version));
     });
+    return header;
+}
+
+} // namespace
+
+ImageFacts exr_header(std::string_view bytes, const Path& file) {
+    const Imf::Header header = header_of(bytes, file);
     const Imath::Box2i& window = header.dataWindow();
     const auto side = [](int first, int last) {
         return static_cast<std::uint64_t>(std::max(std::int64_t(last) - first + 1, std::int64_t(0)));
@@ -121,7 +156,17 @@ ImageFacts exr_header(std::string_view bytes, const Path& file) {
     facts.floats = true;
     if (const auto most = expansion(header.compression()))
         image_check::check_expansion(bytes.size(), *most, facts, facts.channels, file);
+    if (!depth_channel(header.channels()).empty())
+        facts.channels = 1;
     return facts;
+}
+
+std::string exr_channels(std::string_view bytes, const Path& file) {
+    const Imf::Header header = header_of(bytes, file);
+    std::vector<std::string> names;
+    for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel)
+        names.emplace_back(channel.name());
+    return fmt::format("{}: none of them is called Z or depth", fmt::join(names, ", "));
 }
 
 cv::Mat stored_exr(std::string_view bytes, const ImageFacts& facts, const Path& file) {
@@ -131,7 +176,7 @@ cv::Mat stored_exr(std::string_view bytes, const ImageFacts& facts, const Path& 
         Imf::InputFile input(source);
         const Imath::Box2i& window = input.header().dataWindow();
         Imf::FrameBuffer buffer;
-        buffer.insert(input.header().channels().begin().name(),
+        buffer.insert(depth_channel(input.header().channels()),
                       Imf::Slice::Make(Imf::FLOAT, image.data, window, sizeof(float), image.step[0]));
         input.setFrameBuffer(buffer);
         input.readPixels(window.min.y, window.max.y);

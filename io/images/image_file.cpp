@@ -2,6 +2,7 @@
 #include "io/images/image_file.h"
 
 #include "io/images/format.h"
+#include "io/images/readers.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
@@ -23,7 +24,7 @@ std::string read_image_bytes(const fs::path& file) {
     return bytes;
 }
 
-void check_is_depth(const ImageFacts& facts, const fs::path& file) {
+void check_is_depth(std::string_view bytes, const ImageFacts& facts, const fs::path& file) {
     const auto refuse = [&](const std::string& found) {
         throw Error(fmt::format("{}: 16-bit or float depth expected, one channel; found {}", file.string(), found));
     };
@@ -32,7 +33,10 @@ void check_is_depth(const ImageFacts& facts, const fs::path& file) {
     if (!facts.format->no_depth.empty())
         refuse(std::string(facts.format->no_depth));
     if (facts.channels != 1)
-        refuse(fmt::format("{} with {} channels", facts.format->name, facts.channels));
+        refuse(fmt::format("{} with {} channels{}", facts.format->name, facts.channels,
+                           facts.format->header == &images::exr_header
+                               ? fmt::format(" ({})", images::exr_channels(bytes, file))
+                               : ""));
     if (facts.bits != 16 && !(facts.floats && facts.bits == 32))
         refuse(fmt::format("{}-bit {}", facts.bits, facts.format->name));
 }
@@ -113,7 +117,7 @@ cv::Mat read_stored_depth(const fs::path& file) { return stored_depth_in(read_im
 cv::Mat stored_depth_in(const std::string& bytes, const fs::path& file) {
     // Check the header first: an image that cannot be depth is refused for that reason, whatever else is wrong.
     const ImageFacts facts = read_image_header(bytes, file);
-    check_is_depth(facts, file);
+    check_is_depth(bytes, facts, file);
     return read_as_stored(bytes, facts, file);
 }
 
@@ -142,7 +146,8 @@ cv::Mat1f depth_in_metres(const cv::Mat& stored, const DepthEncoding& encoding) 
     };
     const double units = encoding.units_per_metre;
     if (!integers) {
-        each([&](float v) { return v > 0 && std::isfinite(v) ? static_cast<float>(v / units) : 0.0F; }, float());
+        constexpr double background = 1e6; // of renderers: 1e10 where there is nothing
+        each([&](float v) { return v > 0 && v / units < background ? static_cast<float>(v / units) : 0.0F; }, float());
     } else if (encoding.kind == Kind::linear) {
         const std::vector<float>& of = metres_of_integers(units);
         each([&](ushort v) { return of[v]; }, ushort());

@@ -49,6 +49,8 @@ ImageFacts png_header(std::string_view bytes, const Path& file) {
     if (facts.channels == 0 || !legal_bits)
         refuse(file, fmt::format("PNG header says {} bits and colour type {}, which is not PNG", facts.bits,
                                  static_cast<unsigned char>(bytes[25])));
+    if (facts.channels == 2) // how opaque it is, is left out: grey
+        facts.channels = 1;
     return facts;
 }
 
@@ -75,7 +77,7 @@ void check_png_chunks(std::string_view bytes, const ImageFacts& facts, const Pat
     }
     constexpr std::uint64_t deflate_most = 1032; // a match of 258 bytes takes two bits
     constexpr char palette = 3;
-    image_check::check_expansion(packed, deflate_most, facts, bytes[25] == palette ? 1 : facts.channels, file);
+    image_check::check_expansion(packed, deflate_most, facts, bytes[25] == palette ? 1 : channels_of(bytes[25]), file);
 }
 
 } // namespace scanshade::images

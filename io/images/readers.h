@@ -30,6 +30,7 @@ void check_png_chunks(std::string_view bytes, const ImageFacts& facts, const Pat
 [[nodiscard]] std::string encoded_tiff(const cv::Mat& image);
 
 [[nodiscard]] ImageFacts exr_header(std::string_view bytes, const Path& file);
+[[nodiscard]] std::string exr_channels(std::string_view bytes, const Path& file);
 [[nodiscard]] cv::Mat stored_exr(std::string_view bytes, const ImageFacts& facts, const Path& file);
 [[nodiscard]] std::string encoded_exr(const cv::Mat& image);
 

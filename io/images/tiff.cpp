@@ -4,6 +4,7 @@
 #include "projection/base/error.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
@@ -153,7 +154,23 @@ ImageFacts facts_of(const TiffSource& source, const Path& file) {
     facts.floats = source.field<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT) == SAMPLEFORMAT_IEEEFP;
     if (const auto most = expansion(source.field<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE)))
         image_check::check_expansion(coded_bytes(source), *most, facts, facts.channels, file);
+    if (facts.floats || facts.bits == 32) // as it is read
+        facts.bits = facts.floats ? 32 : 16;
     return facts;
+}
+
+/// OpenCV's type of one channel as the file stores it; none where it has no such numbers.
+std::optional<int> stored_type(int bits, int format) {
+    struct Row {
+        int bits, format, type;
+    };
+    constexpr std::array rows{Row{8, SAMPLEFORMAT_UINT, CV_8U},     Row{16, SAMPLEFORMAT_UINT, CV_16U},
+                              Row{16, SAMPLEFORMAT_INT, CV_16S},    Row{32, SAMPLEFORMAT_UINT, CV_32S},
+                              Row{32, SAMPLEFORMAT_INT, CV_32S},    Row{16, SAMPLEFORMAT_IEEEFP, CV_16F},
+                              Row{32, SAMPLEFORMAT_IEEEFP, CV_32F}, Row{64, SAMPLEFORMAT_IEEEFP, CV_64F}};
+    const auto* const found =
+        std::ranges::find_if(rows, [&](const Row& row) { return row.bits == bits && row.format == format; });
+    return found == rows.end() ? std::nullopt : std::optional(found->type);
 }
 
 /// The image as its orientation tag says: first row at the top, first column on the left.
@@ -212,15 +229,28 @@ ImageFacts tiff_header(std::string_view bytes, const Path& file) { return facts_
 
 cv::Mat stored_tiff(std::string_view bytes, const ImageFacts& facts, const Path& file) {
     const TiffSource source(bytes, file);
-    const auto format = source.field<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
-    const bool integers = (facts.bits == 8 || facts.bits == 16) && format == SAMPLEFORMAT_UINT;
-    if (facts.channels != 1 || (!integers && !(facts.bits == 32 && facts.floats)))
-        refuse(file, fmt::format("TIFF of {} bits in sample format {}, expected unsigned integers of 8 or 16 bits, or "
-                                 "floats of 32",
-                                 facts.bits, format));
-    cv::Mat image(facts.size, facts.floats ? CV_32FC1 : facts.bits == 16 ? CV_16UC1 : CV_8UC1);
+    const int format = source.field<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT),
+              bits = source.field<std::uint16_t>(TIFFTAG_BITSPERSAMPLE, 1);
+    const std::optional<int> type = stored_type(bits, format);
+    if (facts.channels != 1 || !type)
+        refuse(file,
+               fmt::format("TIFF of {} bits in sample format {}, expected integers of 8, 16 or 32 bits, or floats "
+                           "of 16, 32 or 64",
+                           bits, format));
+    cv::Mat image(facts.size, *type);
     TIFFIsTiled(source.get()) ? read_tiles(source, image) : read_strips(source, image);
-    return upright(image, source);
+    image = upright(image, source);
+    if (facts.floats) {
+        image.convertTo(image, CV_32F);
+    } else if (*type == CV_16S || *type == CV_32S) { // 16-bit depth all the same; negative ones mark holes
+        double least = 0, largest = 0;
+        cv::minMaxLoc(image, &least, &largest);
+        if (largest > 65535 || (least < 0 && format == SAMPLEFORMAT_UINT))
+            refuse(file, fmt::format("TIFF of integers of {} bits holds {}, expected depth of 16 bits, 0 .. 65535",
+                                     bits, largest > 65535 ? largest : least + 0x1p32));
+        image.convertTo(image, CV_16U);
+    }
+    return image;
 }
 
 cv::Mat3b colour_tiff(std::string_view bytes, const ImageFacts& facts, const Path& file) {
