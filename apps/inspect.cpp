@@ -38,6 +38,7 @@ struct Samples {
     std::map<float, std::size_t> levels; ///< depths of integers, and how often each was seen
     std::size_t recorded = 0;            ///< pixels or points, seen or not
     std::size_t seen = 0;
+    Eigen::AlignedBox3d extent; ///< of the points of clouds
     std::size_t frames = 0;
     std::map<std::pair<int, int>, int> colour_sizes, depth_sizes; ///< width x height -> how many frames
     std::map<std::string, int> clouds;                            ///< description -> how many
@@ -63,8 +64,6 @@ struct Findings {
 
 void add_depths(const ExaminedFrame& examined, Samples& samples) {
     const auto add = [&](double z) {
-        if (!std::isfinite(z) || z == 0)
-            return;
         samples.depths_m.push_back(static_cast<float>(z));
         ++samples.seen;
     };
@@ -75,10 +74,16 @@ void add_depths(const ExaminedFrame& examined, Samples& samples) {
         samples.seen += level.count;
     }
     if (frame.cloud)
-        for (const Eigen::Vector3d& point : frame.cloud->points)
+        for (const Eigen::Vector3d& point : frame.cloud->points) {
+            const bool hole = frame.cloud->organised() && point.z() == 0; // as sensors mark it; elsewhere it is a place
+            if (!point.allFinite() || hole)
+                continue;
             add(point.z());
+            samples.extent.extend(point);
+        }
     for (const float z : frame.depth_m)
-        add(z);
+        if (std::isfinite(z) && z != 0)
+            add(z);
 }
 
 void add_frame(const ExaminedFrame& examined, Samples& samples) {
@@ -96,7 +101,8 @@ void add_frame(const ExaminedFrame& examined, Samples& samples) {
             if (const std::string whole = frame.name + ": " + sentence; // those of the listing are there already
                 std::ranges::find(samples.warnings, whole) == samples.warnings.end())
                 samples.warnings.push_back(whole);
-    const bool without_camera = !frame.cloud && frame.camera.pinhole.fx == 0; // the capture's own warning says so
+    // The capture's own warning says so; and points in no order are seen from everywhere.
+    const bool without_camera = frame.camera.pinhole.fx == 0 && (!frame.cloud || !frame.cloud->organised());
     if (samples.camera || without_camera)
         return;
     try {
@@ -256,6 +262,9 @@ std::string sizes_text(const std::map<std::pair<int, int>, int>& sizes) {
 void print_depth(const Findings& found) {
     const DepthEncoding& depth = found.capture.depth;
     if (!found.samples.clouds.empty()) { // without a camera z is not a depth, and its unit may be feet
+        if (const Eigen::AlignedBox3d& extent = found.samples.extent; !extent.isEmpty())
+            for (const int axis : {0, 1})
+                line(axis == 0 ? "x" : "y", fmt::format("{:.3f} .. {:.3f}", extent.min()[axis], extent.max()[axis]));
         line("z", fmt::format("{:.3f} .. {:.3f}, median {:.3f}", found.nearest_m, found.farthest_m, found.median_m));
         line("holes", fmt::format("{:.1f} %", 100 * hole_share(found.samples)));
         return;

@@ -55,19 +55,29 @@ fs::path whole_path(const fs::path& path) {
 }
 
 struct Content {
-    std::vector<fs::path> folders; ///< sorted, without hidden ones; archives, too
+    std::vector<fs::path> folders; ///< sorted, without hidden ones; archives and recordings, too
     std::vector<fs::path> hidden;  ///< folders whose names begin with '.'
     std::size_t files = 0;
     std::set<std::string> kinds; ///< extensions of the files, at most a few
     std::error_code unreadable;
 };
 
-Content content_of(const fs::path& folder) {
+bool begins_as_recording(const fs::path& file) {
+    try {
+        return is_recording_file(file);
+    } catch (const Error&) { // nobody may read it
+        return false;
+    }
+}
+
+/// `recordings`: files that hold one count as folders.
+Content content_of(const fs::path& folder, bool recordings = false) {
     Content content;
     constexpr std::size_t most_kinds = 5;
     for (const auto& [name, kind] : items_in(folder, content.unreadable)) {
         const fs::path path = folder / name;
-        if (kind == FolderItem::Kind::folder || (lower_extension(path) == ".tar" && is_tar(path))) {
+        if (kind == FolderItem::Kind::folder || (lower_extension(path) == ".tar" && is_tar(path)) ||
+            (recordings && name[0] != '.' && begins_as_recording(path))) {
             (name[0] == '.' ? content.hidden : content.folders).push_back(path);
             continue;
         }
@@ -105,14 +115,16 @@ void find_in(const fs::path& folder, const std::string& name, const CaptureOptio
         return;
     } catch (const Misuse&) {
         throw;
-    } catch (const NoFrames&) { // its folders may be captures
+    } catch (const NoFrames& none) { // its folders and recordings may be captures
+        if (!is_folder(folder))
+            return found({folder, name, std::nullopt, none.what()});
     } catch (const Error& failure) {
         found({folder, name, std::nullopt, failure.what()});
         return;
     }
     if (!walked.insert(whole_path(folder)).second)
         return found(passed_over(folder, "a link to a folder that was searched already"));
-    const Content content = content_of(folder);
+    const Content content = content_of(folder, true);
     if (content.unreadable)
         found({folder, name, std::nullopt, folder.string() + ": cannot be listed: " + content.unreadable.message()});
     else if (content.files > 0)
@@ -123,8 +135,8 @@ void find_in(const fs::path& folder, const std::string& name, const CaptureOptio
     for (const fs::path& each : content.hidden)
         found(passed_over(each, "hidden, as its name begins with '.'"));
     for (const fs::path& each : content.folders)
-        find_in(each, (fs::path(name) / (is_tar(each) ? each.stem() : each.filename())).string(), options, walked,
-                found);
+        find_in(each, (fs::path(name) / (is_folder(each) && !is_tar(each) ? each.filename() : each.stem())).string(),
+                options, walked, found);
 }
 
 std::string own_name(const fs::path& path) {

@@ -8,6 +8,7 @@
 #include "apps/run/openings.h"
 #include "apps/run/tally.h"
 #include "apps/walk/progress.h"
+#include "io/captures/listing/layouts.h"
 #include "io/files.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
@@ -94,32 +95,53 @@ class Run final : public Command {
     }
 
   private:
-    /// Opens the captures. One that cannot be opened is reported and counted; it stops no other.
+    /// Opens the captures. One that cannot be opened is reported and counted; it stops no other. A folder of several
+    /// stands for all of them.
     std::vector<CaptureJob> plan(int& unopened, Tally& tally) {
-        std::vector<CaptureJob> jobs;
-        std::set<std::string> taken;
-        for (const std::string& path : asked_.paths) {
-            const fs::path folder =
-                asked_.paths.size() == 1 ? fs::path(asked_.out) : asked_.out / fs::path(folder_name(path, taken));
+        std::vector<std::shared_ptr<OpenedCapture>> opened; // none: not opened
+        for (std::size_t i = 0; i < asked_.paths.size(); ++i) {
             try {
-                jobs.push_back(openings_.job_from(openings_.opened(path), folder));
-            } catch (const Misuse&) {
-                throw;
-            } catch (const Outage& failure) {
-                warn(fmt::format("failed: {}", failure.what()));
-                failures_.push_back(fmt::format("not opened: {}", failure.what()));
-                tally.add(Fault::outage);
-            } catch (const Error& failure) {
-                warn(fmt::format("failed: {}", failure.what()));
-                failures_.push_back(fmt::format("not opened: {}", failure.what()));
-                ++unopened;
-            } catch (const std::exception& failure) {
-                const auto no_memory = failed_allocation(failure);
-                warn("failed: " + no_memory.value_or(fmt::format("internal error: {}", failure.what())));
-                tally.add(no_memory ? Fault::outage : Fault::internal);
+                opened.push_back(opened_or_told(asked_.paths[i], unopened, tally));
+            } catch (const SeveralCaptures& found) {
+                say(fmt::format("{}: {} captures", asked_.paths[i], found.captures.size()));
+                const auto at = asked_.paths.erase(asked_.paths.begin() + static_cast<std::ptrdiff_t>(i));
+                asked_.paths.insert(at, found.captures.begin(), found.captures.end());
+                --i;
             }
         }
+        std::vector<CaptureJob> jobs;
+        std::set<std::string> taken;
+        for (std::size_t i = 0; i < opened.size(); ++i) {
+            const fs::path folder =
+                opened.size() == 1 ? fs::path(asked_.out) : asked_.out / fs::path(folder_name(asked_.paths[i], taken));
+            if (opened[i])
+                jobs.push_back(openings_.job_from(std::move(opened[i]), folder));
+        }
         return jobs;
+    }
+
+    /// None where it cannot be opened, for a reason that is told. Throws SeveralCaptures for a folder of them.
+    std::shared_ptr<OpenedCapture> opened_or_told(const std::string& path, int& unopened, Tally& tally) {
+        try {
+            return openings_.opened(path);
+        } catch (const Misuse&) {
+            throw;
+        } catch (const SeveralCaptures&) {
+            throw;
+        } catch (const Outage& failure) {
+            warn(fmt::format("failed: {}", failure.what()));
+            failures_.push_back(fmt::format("not opened: {}", failure.what()));
+            tally.add(Fault::outage);
+        } catch (const Error& failure) {
+            warn(fmt::format("failed: {}", failure.what()));
+            failures_.push_back(fmt::format("not opened: {}", failure.what()));
+            ++unopened;
+        } catch (const std::exception& failure) {
+            const auto no_memory = failed_allocation(failure);
+            warn("failed: " + no_memory.value_or(fmt::format("internal error: {}", failure.what())));
+            tally.add(no_memory ? Fault::outage : Fault::internal);
+        }
+        return nullptr;
     }
 
     /// A job made by `plan`: in worker processes, task by task.

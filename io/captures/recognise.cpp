@@ -3,6 +3,7 @@
 #include "io/captures/recognise.h"
 
 #include "io/captures/formats.h"
+#include "io/captures/near_misses.h"
 #include "io/captures/recording_formats.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/format.h"
@@ -15,7 +16,6 @@
 #include <array>
 #include <cctype>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 namespace scanshade {
 
@@ -39,44 +39,20 @@ Listing named(Listing listing, const RecordingFormat& format) {
     return listing;
 }
 
-/// A folder's only file that holds a recording; several are listed in an Error.
+/// A folder's only file that holds a recording; of several, each is a capture by itself.
 std::optional<fs::path> recording_in(const fs::path& folder) {
     std::vector<fs::path> recordings;
     for (const fs::path& file : files_in(folder))
-        if (recording_format(read_bytes(file, enough_for_signatures)))
+        if (is_recording_file(file))
             recordings.push_back(file);
     if (recordings.size() > 1)
-        throw Error(fmt::format("{}: {} recordings, expected one: open {} or another by its name", folder.string(),
-                                recordings.size(), recordings.front().filename().string()));
+        throw NoFrames(fmt::format("{}: {} recordings, each a capture by itself: open {} or another by its name",
+                                   folder.string(), recordings.size(), recordings.front().filename().string()));
     return recordings.empty() ? std::nullopt : std::optional(recordings.front());
 }
 
-/// The names of recordings that are files.
-std::string recording_files() {
-    std::vector<std::string_view> names;
-    for (const RecordingFormat& format : recording_formats())
-        if (*format.extensions)
-            names.emplace_back(format.name);
-    return listed(names, "or");
-}
-
-/// "`camera_matrix.csv` with `depth/`" -> "camera_matrix.csv": what a row is told by first.
-std::string first_sign(const RecordingFormat& format) {
-    std::string sign = format.recognised;
-    for (const std::string_view end : {";", ":", ",", " with", " beside"})
-        sign = sign.substr(0, sign.find(end));
-    std::erase(sign, '`');
-    return sign;
-}
-
 [[noreturn]] void refuse_folder(const fs::path& folder) {
-    std::vector<std::string> signs;
-    for (const RecordingFormat& format : recording_formats())
-        if (format.folder && !format.begins && std::ranges::count(signs, first_sign(format)) == 0)
-            signs.push_back(first_sign(format));
-    throw NoFrames(fmt::format("no frames found in {}: looked for {}, and for one file that is a recording ({}); "
-                               "`scanshade help formats` tells more of each",
-                               folder.string(), fmt::join(signs, ", "), recording_files()));
+    throw NoFrames(fmt::format("no frames found in {}{}", folder.string(), why_no_frames(folder)));
 }
 
 Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
@@ -90,10 +66,8 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
     return named(format.file(*file, options), format);
 }
 
-[[noreturn]] void refuse_file(const fs::path& file) {
-    throw Error(fmt::format("{}: neither a folder, a recording ({}), a depth image ({}) nor a cloud ({})",
-                            file.string(), recording_files(), listed(depth_format_names(), "or"),
-                            listed(cloud_format_names(), "or")));
+[[noreturn]] void refuse_file(const fs::path& file, std::string_view start) {
+    throw Error(fmt::format("{}: {}", file.string(), what_it_is(file, start)));
 }
 
 /// As a shell takes it.
@@ -153,7 +127,7 @@ Listing list_file(const fs::path& file, const CaptureOptions& options) {
         if (!image_format(start))
             refuse_packed(start, file);
         if (!image_format(start) && !has_depth_extension(file))
-            refuse_file(file);
+            refuse_file(file, start);
         entry.depth = file;
         listing.capture.kind = name_of(FormatKind::depth_image);
         listing.capture.depth = assumed_encoding(file);
@@ -165,6 +139,10 @@ Listing list_file(const fs::path& file, const CaptureOptions& options) {
 }
 
 } // namespace
+
+bool is_recording_file(const fs::path& file) {
+    return recording_format(read_bytes(file, enough_for_signatures)) != nullptr;
+}
 
 Listing list_capture(const fs::path& path, const CaptureOptions& options) {
     return is_folder(path) ? list_folder(path, options) : list_file(path, options);

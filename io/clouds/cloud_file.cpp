@@ -491,16 +491,16 @@ std::string encoding_name(const CloudRecords& records) {
 } // namespace
 
 std::string describe(const CloudRecords& records) {
-    std::string names, kind = extension(records).substr(1);
-    std::transform(kind.begin(), kind.end(), kind.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    std::string names;
+    const bool as_read = records.format->written_extension.empty(); // else the encoding is that of what is written
     for (const CloudField& field : records.fields)
         names += " " + field.name;
     const std::string grid =
         records.grid.height > 1 ? fmt::format(", {}x{} organised", records.grid.width, records.grid.height) : "";
     const char* const what = splat_fields(records) ? "Gaussian splat" : "point";
-    return fmt::format("{} {}, {}{}, fields{}{}", kind, encoding_name(records), counted(records.point_count, what),
-                       grid, names, records.unit.empty() ? "" : ", in " + records.unit);
+    return fmt::format("{}{}, {}{}, fields{}{}", records.format->name, as_read ? " " + encoding_name(records) : "",
+                       counted(records.point_count, what), grid, names,
+                       records.unit.empty() ? "" : ", in " + records.unit);
 }
 
 std::string unit_of(const CloudRecords& records) { return records.unit; }

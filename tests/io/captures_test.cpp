@@ -194,7 +194,8 @@ TEST(captures, single_files_are_captures_of_one_frame) {
     const Capture cloud = open_capture(cloud_file); // recognised by content
     EXPECT_EQ(cloud.kind, "cloud");
     EXPECT_EQ(cloud.load(0).cloud->points[0], Eigen::Vector3d(1, 2, 3));
-    EXPECT_TRUE(says(refusal([&] { (void)open_capture(write_file(folder / "notes.txt", "hello")); }), "neither"));
+    EXPECT_TRUE(says(refusal([&] { (void)open_capture(write_file(folder / "notes.txt", "hello")); }),
+                     "text that begins with \"hello\": no cloud"));
 }
 
 /// A bulging wall as 64 x 48 pixels see it, without every seventh pixel; each point is multiplied by `by`.

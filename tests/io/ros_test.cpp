@@ -1,5 +1,6 @@
 // Recordings of ROS, made here byte by byte: bags of ROS 1, MCAP and rosbag2's SQLite files.
 #include "io/captures/capture.h"
+#include "io/captures/listing/layouts.h"
 #include "tests/support/files.h"
 #include "tests/support/ros_files.h"
 
@@ -83,6 +84,44 @@ TEST_P(Ros, a_topic_can_be_named_and_what_is_there_is_listed) {
     EXPECT_TRUE(warned(capture.warnings, "there is no topic /tof/camera_info"));
     options.topic = "/not";
     EXPECT_THROW((void)open_capture(file, options), Misuse);
+}
+
+TEST_P(Ros, recordings_of_clouds_are_refused_as_such) {
+    const std::vector<TestMessage> clouds{{"/ouster/points", "sensor_msgs/PointCloud2", 1, "xyz"},
+                                          {"/ouster/points", "sensor_msgs/PointCloud2", 2, "xyz"}};
+    const std::string expected = "clouds and no depth images: /ouster/points (sensor_msgs/PointCloud2, 2). Clouds of "
+                                 "recordings are not read: export them as PCD or PLY";
+    EXPECT_TRUE(says(refusal([&] { (void)open_capture(recording(clouds)); }), expected));
+    std::vector<TestMessage> with_colour = clouds;
+    for (const TestMessage& message : messages())
+        if (message.topic.find("depth") == std::string::npos)
+            with_colour.push_back(message);
+    EXPECT_TRUE(says(refusal([&] { (void)open_capture(recording(with_colour)); }), expected)) << "colour is no depth";
+    CaptureOptions options;
+    options.topic = "/ouster/points";
+    EXPECT_TRUE(says(refusal([&] { (void)open_capture(recording(clouds), options); }),
+                     "its messages are sensor_msgs/PointCloud2, expected images of depth"));
+}
+
+TEST_P(Ros, several_recordings_in_a_folder_are_several_captures) {
+    const fs::path first = recording(messages());
+    const fs::path set = folder / "set";
+    fs::create_directories(set);
+    const std::string kind = GetParam().name, extension = kind.starts_with("bag")    ? ".bag"
+                                                          : kind.starts_with("mcap") ? ".mcap"
+                                                                                     : ".db3";
+    for (const char* name : {"monday", "tuesday"})
+        fs::copy_file(first, set / (name + extension));
+    try {
+        (void)open_capture_at_or_below(set);
+        ADD_FAILURE() << "one of two was opened";
+    } catch (const SeveralCaptures& several) {
+        EXPECT_EQ(several.captures,
+                  (std::vector<fs::path>{set / ("monday" + extension), set / ("tuesday" + extension)}));
+    }
+    EXPECT_EQ(captures_below(set).size(), 2U);
+    write_file(set / ("empty" + extension), file_bytes(recording({{"/log", "rosgraph_msgs/Log", 1, "none"}})));
+    EXPECT_EQ(captures_below(set).size(), 3U) << "what cannot be opened is told, not passed over";
 }
 
 TEST_P(Ros, floats_are_metres_and_images_without_times_take_the_recorders) {

@@ -35,6 +35,17 @@ struct Listing {
     bool may_stand_still = false;
 };
 
+/// A folder that is no capture, with captures in it.
+class SeveralCaptures : public Error {
+  public:
+    SeveralCaptures(const std::string& sentence, std::vector<std::filesystem::path> found)
+        : Error(sentence), captures(std::move(found)) {}
+    std::vector<std::filesystem::path> captures;
+};
+
+/// Whether the file begins as a recording does: a bag, MCAP, .sens, .mkv, .npz ...
+[[nodiscard]] bool is_recording_file(const std::filesystem::path& file);
+
 // Each returns nothing when the folder is not in its layout, and throws Error when it is but cannot be used.
 [[nodiscard]] std::optional<Listing> list_tum(const std::filesystem::path& folder, const CaptureOptions& options);
 [[nodiscard]] std::optional<Listing> list_nerfstudio(const std::filesystem::path& folder);
@@ -56,6 +67,7 @@ struct Listing {
 [[nodiscard]] std::optional<Listing> list_hypersim(const std::filesystem::path& folder, const CaptureOptions& options);
 [[nodiscard]] std::optional<Listing> list_pcl_recording(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_redwood(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_viewer_snapshots(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_image_folders(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_depth_images(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_clouds(const std::filesystem::path& folder);

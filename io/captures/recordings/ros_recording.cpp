@@ -10,6 +10,7 @@
 #include "projection/base/error.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -170,6 +171,28 @@ bool depth_encoded(const std::string& encoding) {
            encoding.find("compressedDepth") != std::string::npos;
 }
 
+/// Of a recording of lidars, which has no image that --topic could name as depth.
+void refuse_clouds(const Recording& recording, const fs::path& path) {
+    constexpr std::array types{"sensor_msgs/PointCloud2",    "sensor_msgs/PointCloud",
+                               "sensor_msgs/LaserScan",      "velodyne_msgs/VelodyneScan",
+                               "livox_ros_driver/CustomMsg", "livox_ros_driver2/CustomMsg",
+                               "foxglove.PointCloud"};
+    std::vector<std::string> clouds;
+    for (std::uint32_t i = 0; i < recording.topics.size(); ++i) {
+        const Topic& topic = recording.topics[i];
+        if (topic.messages > 0 && has_image_header(topic) && depth_encoded(encoding_of(recording, i)))
+            return;
+        if (topic.messages > 0 && std::ranges::count(types, topic.type) > 0)
+            clouds.push_back(fmt::format("{} ({}, {})", topic.name, topic.type, topic.messages));
+    }
+    if (!clouds.empty())
+        throw NoFrames(
+            fmt::format("{}: clouds and no depth images: {}. Clouds of recordings are not read: export them as "
+                        "PCD or PLY (`rosrun pcl_ros bag_to_pcd`, or a node that saves PointCloud2), and give "
+                        "the folder of these files",
+                        path.string(), fmt::join(clouds, ", ")));
+}
+
 /// The topic of depth: the one that the user names, or the best by name, encoding and camera.
 std::uint32_t depth_topic(const Recording& recording, const std::string& wanted, const fs::path& path,
                           std::vector<std::string>& warnings) {
@@ -177,6 +200,8 @@ std::uint32_t depth_topic(const Recording& recording, const std::string& wanted,
         const auto named = recording.topic_named(wanted);
         if (!named)
             throw Misuse(fmt::format("--topic {}: {} has {}", wanted, path.string(), recording.topics_listed()));
+        if (const Topic& topic = recording.topics[*named]; !has_image_header(topic))
+            throw Misuse(fmt::format("--topic {}: its messages are {}, expected images of depth", wanted, topic.type));
         return *named;
     }
     struct Candidate {
@@ -196,6 +221,7 @@ std::uint32_t depth_topic(const Recording& recording, const std::string& wanted,
         candidates.push_back({i, aligned + camera + raw});
     }
     if (candidates.empty()) {
+        refuse_clouds(recording, path);
         const bool unreadable = std::ranges::any_of(recording.topics, [](const Topic& topic) {
             return topic.messages > 0 && topic.encoding == Encoding::unknown;
         });
@@ -542,6 +568,22 @@ Listing list_ros(const fs::path& path, const std::vector<fs::path>& files, const
     return listing;
 }
 
+namespace {
+
+/// "day_0.mcap", "day_1.mcap": one recording that rosbag2 cut into files.
+bool are_parts(const std::vector<fs::path>& files) {
+    const auto recording_of = [](const fs::path& file) {
+        const std::string stem = file.stem().string();
+        const std::size_t end = stem.rfind('_');
+        return end != std::string::npos && whole_number(stem.substr(end + 1)) ? stem.substr(0, end) : "";
+    };
+    const std::string first = recording_of(files.front());
+    return !first.empty() &&
+           std::ranges::all_of(files, [&](const fs::path& file) { return recording_of(file) == first; });
+}
+
+} // namespace
+
 std::optional<Listing> list_rosbag2_folder(const fs::path& folder, const CaptureOptions& options) {
     const fs::path metadata = folder / "metadata.yaml";
     std::vector<fs::path> files;
@@ -572,7 +614,7 @@ std::optional<Listing> list_rosbag2_folder(const fs::path& folder, const Capture
         for (const fs::path& file : files_in(folder))
             if (const std::string extension = lower_extension(file); extension == ".db3" || extension == ".mcap")
                 files.push_back(file);
-        if (files.size() < 2)
+        if (files.size() < 2 || !are_parts(files))
             return std::nullopt; // a folder's only recording is found by its first bytes
     }
     for (const fs::path& file : files)
