@@ -122,7 +122,7 @@ def test_points_are_darker_in_a_corner():
         (lambda: scanshade.Session(radiu=1), "--radiu: no such flag; did you mean --radius?"),
         (lambda: scanshade.Session(method="surfels"), "method: 'surfels' given"),
         (lambda: scanshade.Session(out="x"), "--out: is a setting of the program"),
-        (lambda: scanshade.ambient_occlusion(corner().astype(int), K), "int64 given, expected uint16 or float32"),
+        (lambda: scanshade.ambient_occlusion(corner().astype(complex), K), "complex128 given, expected floats, or integers"),
         (lambda: scanshade.ambient_occlusion(corner(), np.eye(4)), "K: shape (4, 4) given"),
         (lambda: scanshade.ambient_occlusion(corner(), K, depth_scale="miles"), "miles"),
         (lambda: scanshade.ambient_occlusion(corner(), K, poses=np.eye(4)), "poses: shape (4, 4) given"),
@@ -222,3 +222,76 @@ def test_depths_that_contradict_the_poses_are_doubtful(tmp_path):
     # and of arrays
     depths, poses = np.stack([f.depth * 2 for f in right]), np.stack([f.world_from_camera for f in right])
     assert any("poses" in doubt for doubt in session.ambient_occlusion(depths, right[0].K, poses=poses).doubts)
+
+
+class OnTheProcessor:
+    """A tensor of another library."""
+
+    def __init__(self, array):
+        self.array = array
+
+    def __dlpack__(self, **_):
+        return self.array.__dlpack__()
+
+    def __dlpack_device__(self):
+        return self.array.__dlpack_device__()
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        lambda mm: mm[..., None],
+        lambda mm: mm.astype(np.int32),
+        lambda mm: np.where(mm == 0, -1, mm.astype(np.int64)),
+        lambda mm: mm.tolist(),
+        lambda mm: OnTheProcessor(mm.astype(np.int32)),
+    ],
+    ids=["last_axis", "int32", "negative_holes", "lists", "dlpack"],
+)
+def test_depth_of_other_types_is_the_same_depth(given):
+    depth = corner(160, 120)
+    camera = {"fx": 131.0, "fy": 131.0, "cx": 79.5, "cy": 59.5}
+    expected = scanshade.ambient_occlusion(depth, [131.0, 131.0, 79.5, 59.5]).ao
+    found = scanshade.ambient_occlusion(given(depth), camera).ao
+    assert np.array_equal(found, expected, equal_nan=True)
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float16])
+def test_floats_of_other_widths_are_metres(kind):
+    metres = (corner(160, 120) / 1000).astype(kind)
+    expected = scanshade.ambient_occlusion(metres.astype(np.float32), [131, 131, 79.5, 59.5]).ao
+    assert np.array_equal(scanshade.ambient_occlusion(metres, [131, 131, 79.5, 59.5]).ao, expected, equal_nan=True)
+    four = scanshade.ambient_occlusion(metres[None, ..., None], [131, 131, 79.5, 59.5]).ao
+    assert np.array_equal(four, expected[None], equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    "depth, why",
+    [
+        (np.zeros((6, 8), np.uint8), "depth: uint8 given"),
+        (np.full((6, 8), 70000), "depth: int64 up to 70000 given"),
+        (np.zeros((6, 8), bool), "depth: bool given"),
+    ],
+)
+def test_what_is_no_depth_is_refused_by_its_type(depth, why):
+    with pytest.raises(scanshade.Error, match=why):
+        scanshade.ambient_occlusion(depth, [10, 10, 3.5, 2.5])
+    with pytest.raises(scanshade.Error, match="K: fy, cx, cy missing"):
+        scanshade.ambient_occlusion(np.ones((6, 8), np.float32), {"fx": 10})
+
+
+def test_doubts_are_warnings_at_the_callers_line():
+    with pytest.warns(scanshade.Doubt, match="every pixel is a hole") as told:
+        result = scanshade.ambient_occlusion(np.zeros((60, 80), np.float32), [70, 70, 39.5, 29.5])
+    assert result.doubts and told[0].filename == __file__
+    with pytest.warns(scanshade.Doubt, match="5 points cannot show a surface"):
+        scanshade.point_ambient_occlusion(np.random.default_rng(1).random((5, 3)))
+
+
+def test_names_and_help_are_for_people():
+    assert dir(scanshade) == sorted([*scanshade.__all__, "__version__"])
+    assert "(N, H, W)" in scanshade.ambient_occlusion.__doc__ and ">>>" in scanshade.ambient_occlusion.__doc__
+    assert "(N, 3)" in scanshade.point_ambient_occlusion.__doc__
+    result = scanshade.ambient_occlusion(corner(160, 120), [131, 131, 79.5, 59.5])
+    assert repr(result).startswith("<scanshade.Result: ao (120, 160), mean 0.")
+    assert repr(scanshade.Session()) == "<scanshade.Session: cacao>"

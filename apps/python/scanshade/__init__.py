@@ -14,6 +14,8 @@ import ctypes as c
 import functools
 import json
 import os
+import sys
+import warnings
 from typing import Any, Iterator, Mapping, Optional, Sequence, Union
 
 import numpy as np
@@ -22,12 +24,61 @@ from . import _c
 from ._c import Error
 
 __all__ = [
-    "Capture", "Error", "Frame", "Result", "Session", "ambient_occlusion", "devices", "open", "point_ambient_occlusion",
+    "Capture", "Doubt", "Error", "Frame", "Result", "Session", "ambient_occlusion", "devices", "open", "point_ambient_occlusion",
     "refine_camera", "settings",
 ]  # fmt: skip
 __version__: str = _c.text("version")
 
 Value = Union[str, bool, int, float]
+
+
+class Doubt(UserWarning):
+    """Why values may be wrong. `warnings.simplefilter("error", scanshade.Doubt)` makes it an exception."""
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]
+
+
+def _warn_of_doubts(result: Result) -> None:
+    """Where the caller's line is not in this file."""
+    for frame in result.info["frames"]:
+        for doubt in frame["doubts"]:
+            name = f"image {frame['name']}: " if len(result.info["frames"]) > 1 else ""
+            warnings.warn(name + doubt, Doubt, stacklevel=_callers_level())
+
+
+def _callers_level() -> int:
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_code.co_filename == __file__:
+        frame, level = frame.f_back, level + 1
+    return level
+
+
+def _array(values: Any) -> np.ndarray:
+    """Of lists, of NumPy, and without a copy of what other libraries keep in the processor's memory (DLPack)."""
+    if not isinstance(values, np.ndarray) and hasattr(values, "__dlpack__") and hasattr(np, "from_dlpack"):
+        return np.from_dlpack(values)
+    return np.asarray(values)
+
+
+def _depth_images(depth: Any) -> np.ndarray:
+    """(H, W) or (N, H, W) of uint16 or float32."""
+    images = _array(depth)
+    given = images.shape
+    if images.ndim in (3, 4) and images.shape[-1] == 1:
+        images = images[..., 0]
+    if images.ndim not in (2, 3) or 0 in images.shape:
+        raise Error(f"depth: shape {given} given, expected (H, W) or (N, H, W), maybe with a last axis of 1")
+    if images.dtype in (np.uint16, np.float32):
+        return images
+    if images.dtype in (np.float16, np.float64):
+        return images.astype(np.float32)
+    if images.dtype.kind in "iu" and images.dtype.itemsize > 1:
+        if images.max() > 65535:
+            raise Error(f"depth: {images.dtype} up to {images.max()} given, expected integers of 0 .. 65535")
+        return np.maximum(images, 0).astype(np.uint16)  # negative numbers mark holes
+    raise Error(f"depth: {images.dtype} given, expected floats, or integers of 16 bits or more")
 
 
 def _setting_text(value: Value) -> str:
@@ -41,7 +92,12 @@ def _settings(given: Mapping[str, Optional[Value]]) -> Any:
 
 
 def _camera(K: Any, distortion: Optional[Sequence[float]], fisheye: bool) -> _c.Camera:
-    matrix = np.asarray(K, dtype=np.float64)
+    if isinstance(K, Mapping):
+        missing = [name for name in ("fx", "fy", "cx", "cy") if name not in K]
+        if missing:
+            raise Error(f"K: {', '.join(missing)} missing among {', '.join(map(str, K))}")
+        K = [K[name] for name in ("fx", "fy", "cx", "cy")]
+    matrix = _array(K).astype(np.float64)
     if matrix.shape == (4,):
         fx, fy, cx, cy = matrix
     elif matrix.shape == (3, 3):
@@ -111,6 +167,10 @@ class Result:
         """Why values may be wrong, as sentences, of all images; empty = no reason known."""
         return [doubt for frame in self.info["frames"] for doubt in frame["doubts"]]
 
+    def __repr__(self) -> str:
+        told = f", {len(self.doubts)} doubts" if self.doubts else ""
+        return f"<scanshade.Result: ao {self.ao.shape}, mean {np.nanmean(self.ao) if np.isfinite(self.ao).any() else np.nan:.3f}{told}>"
+
 
 def _outputs(confidence: bool, normals: bool) -> int:
     return _c.CONFIDENCE * bool(confidence) | _c.NORMALS * bool(normals)
@@ -118,7 +178,7 @@ def _outputs(confidence: bool, normals: bool) -> int:
 
 def _rows(values: Any, name: str, count: Optional[int] = None) -> tuple[np.ndarray, int]:
     """(N, 3) floats whose rows may lie apart, and their type in C."""
-    array = np.asarray(values)
+    array = _array(values)
     if array.ndim != 2 or array.shape[1] != 3 or (count is not None and len(array) != count):
         raise Error(f"{name}: shape {array.shape} given, expected ({'N' if count is None else count}, 3)")
     if array.dtype not in (np.float32, np.float64):
@@ -155,6 +215,11 @@ class Session:
             raise Error("the session belongs to another process: after a fork, make a new one, or use 'spawn'")
         return self._handle.value
 
+    def __repr__(self) -> str:
+        if not self._handle.value:
+            return "<scanshade.Session: closed>"
+        return f"<scanshade.Session: {self.settings.get('method', '')}>"
+
     @property
     def settings(self) -> dict[str, Any]:
         """All settings that shape results, as used."""
@@ -174,8 +239,9 @@ class Session:
     ) -> Result:
         """Ambient occlusion of depth images of one camera, or of a frame of a capture.
 
-        depth:       (H, W) or (N, H, W), uint16 (0 and 65535 = hole) or float32 (0 and not finite = hole); or cap[i]
-        K:           (3, 3) intrinsics, or fx, fy, cx, cy; None for a frame
+        depth:       (H, W) or (N, H, W), maybe with a last axis of 1: integers of 16 bits (0 and 65535 = hole), also in wider
+                     types, or floats (0 and not finite = hole); an array, a tensor on the processor, or cap[i]
+        K:           (3, 3) intrinsics, or fx, fy, cx, cy, or a dict of these; None for a frame
         depth_scale: units per metre, or mm, tum, sun, nyu, m; default millimetres of uint16, metres of float32
         poses:       (N, 4, 4) world_from_camera, for the setting sequence="on"; a pose with a NaN is none
         distortion:  k1, k2, p1, p2, k3, maybe k4, k5, k6; of a fisheye k1, k2, k3, k4
@@ -184,14 +250,12 @@ class Session:
         if isinstance(depth, Frame):
             if any(given is not None for given in (K, depth_scale, poses, distortion)):
                 raise Error("a frame of a capture has its own camera, scale and pose: give these to open()")
-            return Result(_c.Handle(*out, "compute_frame", self._open(), depth._handle.value, outputs))
-        images = np.asarray(depth)
-        if images.ndim not in (2, 3) or 0 in images.shape:
-            raise Error(f"depth: shape {images.shape} given, expected (H, W) or (N, H, W)")
-        if images.dtype not in (np.uint16, np.float32):
-            raise Error(f"depth: {images.dtype} given, expected uint16 or float32")
+            result = Result(_c.Handle(*out, "compute_frame", self._open(), depth._handle.value, outputs))
+            _warn_of_doubts(result)
+            return result
+        images = _depth_images(depth)
         if K is None:
-            raise Error("the depth image has no camera: fx, fy, cx and cy are needed")
+            raise Error("K: the depth image has no camera: fx, fy, cx and cy are needed")
         if images.strides[-1] != images.itemsize or min(images.strides) <= 0:
             images = np.ascontiguousarray(images)
         count = images.shape[0] if images.ndim == 3 else 1
@@ -214,7 +278,9 @@ class Session:
                 raise Error(f"poses: shape {matrices.shape} given, expected ({count}, 4, 4)")
             given.world_from_camera = matrices.ctypes.data
         handle = _c.Handle(*out, "compute_depth", self._open(), c.byref(given), outputs)
-        return Result(handle, images.shape)
+        result = Result(handle, images.shape)
+        _warn_of_doubts(result)
+        return result
 
     def point_ambient_occlusion(
         self,
@@ -257,7 +323,9 @@ class Session:
             kept.append(place)
         outputs = _outputs(confidence, with_normals)
         handle = _c.Handle("result_free", "compute_points", self._open(), c.byref(given), outputs)
-        return Result(handle, (len(array),))
+        result = Result(handle, (len(array),))
+        _warn_of_doubts(result)
+        return result
 
 
 @functools.lru_cache(maxsize=4)
@@ -282,7 +350,20 @@ def ambient_occlusion(
     normals: bool = False,
     **settings: Optional[Value],
 ) -> Result:
-    """Session(**settings).ambient_occlusion(...), where the sessions of the last four settings are kept."""
+    """Ambient occlusion of depth images: a Result with `ao`, float32 of the images' shape, 1 = open, 0 = closed, NaN = no surface.
+
+    depth:       (H, W) or (N, H, W) images along z: integers of 16 bits, in mm unless depth_scale says otherwise, or floats
+                 in m; 0 = hole. Or a frame of a capture, cap[i], which has its own camera.
+    K:           (3, 3) intrinsics in pixels, or fx, fy, cx, cy
+    depth_scale, poses, distortion, fisheye, confidence, normals: as of Session.ambient_occlusion
+    settings:    of `scanshade run`, by name: radius=0.5 (m), method="surfel"; scanshade.settings() lists them
+
+    Raises Error for wrong shapes, types and settings. Warns (Doubt) where values may be wrong. The sessions of the last four
+    settings are kept.
+
+    >>> result = scanshade.ambient_occlusion(depth_mm, [525, 525, 319.5, 239.5], radius=0.5)
+    >>> shaded = colour * result.ao[..., None]
+    """
     return _session(settings).ambient_occlusion(
         depth, K, depth_scale=depth_scale, poses=poses, distortion=distortion, fisheye=fisheye, confidence=confidence,
         normals=normals,
@@ -300,8 +381,18 @@ def point_ambient_occlusion(
     z_up: bool = False,
     **settings: Optional[Value],
 ) -> np.ndarray:
-    """Visibility of every point, float32 (N,). `radius` in the unit of the points; None = from their extent and spacing.
-    `sky`: the share of the sky that a point sees, at any distance."""
+    """Visibility of every point, float32 (N,), 1 = open, 0 = closed, NaN = no valid point.
+
+    points:    (N, 3) floats; rows with NaN are no points
+    normals:   (N, 3), or None: estimated
+    radius:    in the unit of the points; None = from their extent and spacing
+    sky:       the share of the sky that a point sees, at any distance
+    triangles, scanner, z_up: as of Session.point_ambient_occlusion
+
+    Raises Error for wrong shapes and settings. Warns (Doubt) where values may be wrong.
+
+    >>> visibility = scanshade.point_ambient_occlusion(points, radius=0.2)
+    """
     given = {"cloud.radius": radius, "cloud.sky": sky or None, **settings}
     return _session(given).point_ambient_occlusion(points, normals, triangles=triangles, scanner=scanner, z_up=z_up).ao
 
@@ -339,6 +430,10 @@ class Frame:
             self.distortion = np.array(camera.distortion[: 4 if self.fisheye else 5] + denominator)
         self.world_from_camera = _view(data.world_from_camera, (4, 4), np.float64, handle)
 
+    def __repr__(self) -> str:
+        what = f"depth {self.depth.shape}" if self.depth is not None else f"points {self.points.shape}"
+        return f"<scanshade.Frame {self.name!r}: {what}>"
+
 
 class Capture(Sequence[Frame]):
     """A recording: a folder, a depth image or a cloud file. `len()` and `[]` make it a torch Dataset.
@@ -351,6 +446,9 @@ class Capture(Sequence[Frame]):
         self.path, self._given = os.fspath(path), settings
         given = _settings(settings)
         self._handle = _c.Handle("capture_close", "capture_open", os.fsencode(self.path), given, len(given))
+
+    def __repr__(self) -> str:
+        return f"<scanshade.Capture {self.path!r}: {self.info['kind']}, {len(self)} frames>"
 
     def __reduce__(self) -> Any:
         return functools.partial(Capture, self.path, **self._given), ()
