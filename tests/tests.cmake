@@ -102,6 +102,7 @@ else()
   target_link_libraries(camera_test opencv_calib3d)
   set_target_properties(compiled_once_test PROPERTIES ENABLE_EXPORTS ON) # so that the driver finds its function
   target_link_libraries(compiled_once_test ${CMAKE_DL_LIBS})
+  target_link_libraries(horizon_test ao_horizon)
   target_link_libraries(laz_test io_clouds_laz)
   target_link_libraries(images_of_others_test TIFF::TIFF)
   target_link_libraries(containers_files_test PkgConfig::LZ4)
