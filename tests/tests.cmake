@@ -103,6 +103,8 @@ else()
   set_target_properties(compiled_once_test PROPERTIES ENABLE_EXPORTS ON) # so that the driver finds its function
   target_link_libraries(compiled_once_test ${CMAKE_DL_LIBS})
   target_link_libraries(horizon_test ao_horizon)
+  target_link_libraries(relief_reference_test ao_horizon io_rasters)
+  target_link_libraries(rasters_test io_rasters TIFF::TIFF)
   target_link_libraries(laz_test io_clouds_laz)
   target_link_libraries(images_of_others_test TIFF::TIFF)
   target_link_libraries(containers_files_test PkgConfig::LZ4)
