@@ -65,6 +65,7 @@ std::unique_ptr<Command> status_command();
 std::unique_ptr<Command> merge_command();
 std::unique_ptr<Command> view_command();
 std::unique_ptr<Command> refine_command();
+std::unique_ptr<Command> relief_command();
 std::unique_ptr<Command> compare_command();
 std::unique_ptr<Command> bench_command();
 std::unique_ptr<Command> generate_command();

@@ -35,6 +35,8 @@ const std::array commands = {
     CommandRow{"refine",
                "finds the camera and its uncertainty from pictures of a board, organised clouds or a recording",
                refine_command},
+    CommandRow{"relief", "makes maps of sky view, openness and ambient occlusion from DEMs and points of surveys",
+               relief_command},
     CommandRow{"compare", "compares two results, or a result and truth: numbers and difference pictures",
                compare_command},
     CommandRow{"bench", "measures methods and settings against truth: time, error and the Pareto front, as a page",

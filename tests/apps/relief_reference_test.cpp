@@ -1,6 +1,8 @@
 // Height fields beside the outputs of the Relief Visualization Toolbox, and dense rays: the folder relief beside the
 // one that SCANSHADE_FIXTURES names.
 #include "ao/horizon/horizon.h"
+#include "apps/relief/maps.h"
+#include "apps/relief/surface.h"
 #include "io/rasters/raster.h"
 #include "io/text.h"
 
@@ -155,6 +157,108 @@ TEST(ReliefReference, local_dominance_is_the_toolbox_and_dense_rays) {
         EXPECT_LE(rvt.worst, 1e-5) << row.at("name");
         EXPECT_LE(truth.rmse, 0.002) << row.at("name");
         EXPECT_EQ(rvt.holes_differ, 0);
+    }
+}
+
+/// The same heights in other files: every layout, area and point, integers with a scale, feet.
+TEST(ReliefReference, the_same_terrain_in_any_file_has_the_same_view) {
+    NEEDS_FIXTURES();
+    horizon::Settings settings;
+    settings.radius = 5;
+    const auto view = [&](const std::string& name) {
+        const rasters::Raster raster = rasters::read_raster(fixtures() / "dem" / name);
+        return horizon::layers_of({raster.z, raster.grid.cell}, relief::in_units_of(raster.grid, settings),
+                                  {.svf = true})
+            .svf;
+    };
+    const cv::Mat1f terrain = view("terrain.tif"), holes = view("terrain_holes_nan.tif");
+    for (const char* name : {"terrain_big_endian.tif", "terrain_bigtiff.tif", "terrain_cog.tif", "terrain_point.tif",
+                             "terrain_tiled_lzw.tif", "terrain_tiepoint_inside.tif", "terrain_transformation.tif",
+                             "terrain_half_offset.tif", "no_crs.tif"})
+        EXPECT_EQ(difference(view(name), terrain, 0).worst, 0) << name;
+    for (const char* name : {"terrain_us_feet.tif", "terrain_feet_z_metres.tif"}) // heights rounded in feet
+        EXPECT_LT(difference(view(name), terrain, 0).worst, 2e-4) << name;
+    EXPECT_LT(difference(view("terrain_int16_cm.tif"), terrain, 0).rmse, 0.005); // heights of whole centimetres
+    for (const char* name : {"terrain_holes_9999.tif", "terrain_holes_huge.tif"}) {
+        EXPECT_EQ(difference(view(name), holes, 0).worst, 0) << name;
+        EXPECT_EQ(difference(view(name), holes, 0).holes_differ, 0) << name;
+    }
+    const rasters::Grid area = rasters::read_raster(fixtures() / "dem" / "terrain.tif").grid;
+    for (const char* name : {"terrain_point.tif", "terrain_tiepoint_inside.tif", "terrain_transformation.tif"}) {
+        const rasters::Grid grid = rasters::read_raster(fixtures() / "dem" / name).grid;
+        EXPECT_EQ(grid.x0, area.x0) << name;
+        EXPECT_EQ(grid.y0, area.y0) << name;
+    }
+}
+
+/// A value at the edge of two bytes may fall on either side, as it is rounded to 1e-5.
+TEST(ReliefReference, bytes_are_those_of_the_toolbox) {
+    NEEDS_FIXTURES();
+    const horizon::HeightField field = field_of(fixtures() / "dem/tm1_crop.tif");
+    horizon::Settings settings;
+    settings.profile = horizon::Profile::rvt;
+    const horizon::Layers layers = horizon::layers_of(field, settings, {true, true, true, true, true, false});
+    const auto compared = [&](const cv::Mat1f& map, const std::string& layer) {
+        const cv::Mat1b bytes = relief::stretched(map, layer);
+        const cv::Mat1f reference = rasters::read_raster(fixtures() / "rvt_names" /
+                                                         relief::map_file_name("tm1_crop", layer, settings, 10, true))
+                                        .z;
+        int other = 0;
+        for (int r = 0; r < bytes.rows; ++r)
+            for (int c = 0; c < bytes.cols; ++c) {
+                EXPECT_LE(std::abs(bytes(r, c) - reference(r, c)), 1) << layer << " " << r << " " << c;
+                other += static_cast<float>(bytes(r, c)) != reference(r, c);
+            }
+        EXPECT_LE(other, 30) << layer;
+    };
+    compared(layers.svf, "svf"), compared(layers.asvf, "asvf"), compared(layers.openness, "openness");
+    compared(layers.openness_neg, "openness-neg"), compared(layers.dominance, "dominance");
+}
+
+/// Ground of points with 3 cm of noise, where cells are no holes: a TIN of all ground points is 0.024 m off.
+TEST(ReliefReference, ground_of_points_is_the_true_ground) {
+    NEEDS_FIXTURES();
+    for (const json& row : cases()) {
+        if (!row.contains("cloud"))
+            continue;
+        std::vector<fs::path> files;
+        for (const std::string file : row.at("cloud"))
+            files.push_back(fixtures() / file);
+        const relief::SurveyPoints survey = relief::read_survey(files);
+        const relief::SurfaceRaster surface = relief::surface_of(survey, {.cell_m = row.at("cell").get<double>()});
+        const fs::path truth = fixtures() / row.at("reference");
+        const rasters::Raster dtm = rasters::read_raster(truth, 1);
+        const rasters::Grid& grid = surface.raster.grid;
+        ASSERT_EQ(surface.raster.z.size(), dtm.z.size());
+        EXPECT_NEAR(grid.x0, dtm.grid.x0, 1e-6);
+        EXPECT_NEAR(grid.y0, dtm.grid.y0, 1e-6);
+        EXPECT_EQ(grid.crs.epsg, dtm.grid.crs.epsg);
+        EXPECT_NEAR(grid.crs.unit_m, row.at("unit").get<double>(), 1e-12);
+        const cv::Mat1f mask = rasters::read_raster(truth, 10).z;
+        const int margin = row.at("margin");
+        cv::Mat1f heights = surface.raster.z.clone(), true_heights = dtm.z.clone();
+        true_heights.setTo(NAN, mask != 0);
+        for (float& height : heights)
+            height = static_cast<float>((double(height) + surface.raster.base) * grid.crs.height_unit_m);
+        const Difference height = difference(heights, true_heights, margin);
+        horizon::Settings settings;
+        settings.radius = row.at("radius");
+        settings.directions = 32;
+        const horizon::Layers layers = horizon::layers_of(
+            {surface.raster.z, grid.cell}, relief::in_units_of(grid, settings), {.svf = true, .ao = true});
+        const auto outside_holes = [&](const cv::Mat1f& map, int band) {
+            cv::Mat1f reference = rasters::read_raster(truth, band).z;
+            reference.setTo(NAN, mask != 0);
+            return difference(map, reference, margin);
+        };
+        const Difference svf = outside_holes(layers.svf, 2), ao = outside_holes(layers.ao, 9);
+        if (std::getenv("RELIEF_TABLE"))
+            fmt::print("{}: heights {:.4f} m (bias {:+.4f}), svf {:.4f}, ao {:.4f}\n",
+                       row.at("name").get<std::string>(), height.rmse, height.bias, svf.rmse, ao.rmse);
+        const bool classed = row.at("classed");
+        EXPECT_LT(height.rmse, classed ? 0.03 : 0.06) << row.at("name");
+        EXPECT_LT(svf.rmse, classed ? 0.017 : 0.045) << row.at("name");
+        EXPECT_LT(ao.rmse, classed ? 0.005 : 0.04) << row.at("name");
     }
 }
 

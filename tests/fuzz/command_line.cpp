@@ -30,9 +30,9 @@ class Run final : public Command {
 
 std::unique_ptr<Command> settings_of_run() { return std::make_unique<Run>(); }
 
-constexpr std::array makers = {inspect_command, settings_of_run,  plan_command,    status_command,
-                               merge_command,   view_command,     refine_command,  compare_command,
-                               bench_command,   generate_command, methods_command, devices_command};
+constexpr std::array makers = {inspect_command,  settings_of_run, plan_command,   status_command,  merge_command,
+                               view_command,     refine_command,  relief_command, compare_command, bench_command,
+                               generate_command, methods_command, devices_command};
 
 /// Every value as text sets the same value: a manifest holds it so, and a run is made again from it.
 void must_say_it_again(Command& command) {

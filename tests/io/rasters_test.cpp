@@ -195,6 +195,8 @@ TEST(Rasters, points_and_inner_tiepoints_lie_where_they_say) {
 
 TEST(Rasters, world_files_and_texts_beside_are_read) {
     Made file = made(std::vector<float>{1, 2, 3, 4}, {2, 2});
+    for (const char* earlier : {"beside.tfw", "beside.prj"})
+        fs::remove(folder() / earlier);
     const fs::path path = file.write("beside.tif");
     EXPECT_TRUE(tests::warned(read_raster(path).notes, "does not say where it lies"));
     tests::write_file(folder() / "beside.tfw", "0.5\n0\n0\n-0.5\n100.25\n199.75\n");

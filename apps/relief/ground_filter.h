@@ -1,0 +1,15 @@
+// Ground among unclassified points: the progressive morphological filter (Zhang et al. 2003, IEEE TGRS 41(4)).
+#pragma once
+
+#include <opencv2/core.hpp>
+
+namespace scanshade::relief {
+
+/// Lowest height of each cell, NaN = none -> the surface below which no building or tree of up to `window_m` across
+/// reaches; points above it by more than tolerance_m() are not ground. Heights and cell in metres.
+[[nodiscard]] cv::Mat1f opened_ground(const cv::Mat1f& lowest, double cell_m, double window_m);
+
+/// How far ground may lie above the opened surface, metres.
+[[nodiscard]] constexpr double ground_tolerance_m() { return 0.3; }
+
+} // namespace scanshade::relief

@@ -1,0 +1,205 @@
+#include "apps/relief/maps.h"
+
+#include "projection/base/error.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fmt/format.h>
+#include <optional>
+
+namespace scanshade::relief {
+
+namespace fs = std::filesystem;
+using namespace horizon;
+
+namespace {
+
+/// A layer's part of a file name, and its stretch.
+struct MapRow {
+    std::string_view name;
+    float from = 0, to = 1; ///< of 8 bits
+    bool inverted = false;
+    cv::Mat1f Layers::*layer = nullptr; ///< null: not of the walk
+    bool Wanted::*wanted = nullptr;
+};
+
+const std::array rows = {
+    MapRow{"svf", 0.6375F, 1, false, &Layers::svf, &Wanted::svf},
+    MapRow{"asvf", 0.7F, 0.9F, false, &Layers::asvf, &Wanted::asvf},
+    MapRow{"openness", 60, 95, false, &Layers::openness, &Wanted::openness},
+    MapRow{"openness-neg", 60, 95, true, &Layers::openness_neg, &Wanted::openness_neg},
+    MapRow{"dominance", 0.5F, 1.8F, false, &Layers::dominance, &Wanted::dominance},
+    MapRow{"ao", 0, 1, false, &Layers::ao, &Wanted::ao},
+    MapRow{"dtm"},
+    MapRow{"source"},
+};
+
+const MapRow& row_of(const std::string& layer) { return *std::ranges::find(rows, layer, &MapRow::name); }
+
+std::string noise_suffix(const std::string& layer, Noise noise) {
+    switch (noise) {
+    case Noise::none:
+        return "";
+    case Noise::low:
+        return "_NRlow";
+    case Noise::medium:
+        return "_NRmedium";
+    case Noise::high:
+        return layer == "openness-neg" ? "_NRstrong" : "_NRhigh"; // as the toolbox has it
+    }
+    return "";
+}
+
+std::string stem_of(const std::string& layer, const Settings& s, double radius) {
+    const std::string walk = fmt::format("R{:.6g}_D{}", radius, s.directions);
+    if (layer == "svf")
+        return "SVF_" + walk;
+    if (layer == "asvf")
+        return fmt::format("SVF-A_{}_A{:g}_AL{}", walk, s.azimuth, s.anisotropy == Anisotropy::low ? "low" : "high");
+    if (layer == "openness")
+        return "OPEN-POS_" + walk;
+    if (layer == "openness-neg")
+        return "OPEN-NEG_" + walk;
+    if (layer == "dominance")
+        return fmt::format("LD_R_M{}-{}_DI{}_A{}_OH{:g}", s.dominance.least, s.dominance.most, s.dominance.step,
+                           s.dominance.angle, s.dominance.observer);
+    if (layer == "ao")
+        return fmt::format("AO_R{:.6g}", radius);
+    return layer == "dtm" ? "DTM" : "SOURCE";
+}
+
+std::string definition_word(Definition definition) {
+    return definition == Definition::solid_angle  ? "solid-angle"
+           : definition == Definition::horizontal ? "horizontal"
+                                                  : "surface";
+}
+
+std::string description_of(const std::string& layer, const Settings& s) {
+    const std::string rvt = s.profile == Profile::rvt ? " as RVT computes it" : "";
+    if (layer == "svf")
+        return "sky-view factor, " + definition_word(s.definition) + rvt;
+    if (layer == "asvf")
+        return fmt::format("anisotropic sky-view factor, solid angle, brightest at {:g} degrees {} from north{}",
+                           s.azimuth, s.profile == Profile::rvt ? "counterclockwise" : "clockwise", rvt);
+    if (layer == "openness")
+        return "positive openness, degrees" + rvt;
+    if (layer == "openness-neg")
+        return "negative openness, degrees" + rvt;
+    if (layer == "dominance")
+        return "local dominance" + rvt;
+    if (layer == "ao")
+        return "visibility: 1 open, 0 closed; cosine-weighted, occluders within a ball of the radius";
+    return layer == "dtm" ? "heights" : "0 no data, 1 measured, 2 interpolated";
+}
+
+rasters::RasterText text_of(const std::string& layer, const Settings& s) {
+    rasters::RasterText text{description_of(layer, s), {{"SOFTWARE", "scanshade " SCANSHADE_VERSION}}};
+    if (layer == "dtm" || layer == "source")
+        return text;
+    if (layer == "svf")
+        text.items.emplace_back("SVF_DEFINITION", definition_word(s.definition));
+    text.items.emplace_back("PROFILE", s.profile == Profile::rvt ? "rvt" : "exact");
+    if (layer != "dominance")
+        text.items.emplace_back("RADIUS_M", fmt::format("{:g}", s.radius));
+    text.items.emplace_back("DIRECTIONS", fmt::format("{}", s.directions));
+    text.items.emplace_back("EXAGGERATION", fmt::format("{:g}", s.exaggeration));
+    return text;
+}
+
+/// The radius in metres that is asked for; 10 cells where none is.
+Settings with_radius(Settings settings, const rasters::Grid& grid) {
+    constexpr double usual_cells = 10;
+    if (settings.radius == 0)
+        settings.radius = usual_cells * grid.cell * grid.crs.unit_m;
+    return settings;
+}
+
+double radius_in_cells(const Settings& settings, const rasters::Grid& grid) {
+    const double radius = settings.radius / (grid.cell * grid.crs.unit_m);
+    return settings.profile == Profile::rvt ? std::nearbyint(radius) : radius;
+}
+
+} // namespace
+
+const std::vector<std::string>& map_names() {
+    static const std::vector<std::string> names = [] {
+        std::vector<std::string> all;
+        for (const MapRow& row : rows)
+            all.emplace_back(row.name);
+        return all;
+    }();
+    return names;
+}
+
+Settings in_units_of(const rasters::Grid& grid, const Settings& settings) {
+    Settings own = settings;
+    own.radius /= grid.crs.unit_m;
+    own.exaggeration *= grid.crs.height_unit_m / grid.crs.unit_m;
+    own.dominance.observer /= grid.crs.unit_m;
+    return own;
+}
+
+std::string map_file_name(const std::string& name, const std::string& layer, const Settings& settings,
+                          double radius_cells, bool bytes) {
+    const bool walks = row_of(layer).layer != nullptr && layer != "dominance" && layer != "ao";
+    return name + "_" + stem_of(layer, settings, radius_cells) + (walks ? noise_suffix(layer, settings.noise) : "") +
+           (bytes ? "_8bit" : "") + ".tif";
+}
+
+cv::Mat1b stretched(const cv::Mat1f& values, const std::string& layer) {
+    const MapRow& row = row_of(layer);
+    cv::Mat1b bytes(values.size());
+    for (int r = 0; r < values.rows; ++r)
+        for (int c = 0; c < values.cols; ++c) {
+            float share = std::clamp((values(r, c) - row.from) / (row.to - row.from), 0.0F, 1.0F);
+            share = row.inverted ? 1 - share : share;
+            bytes(r, c) = std::isnan(values(r, c)) ? 255 : static_cast<std::uint8_t>(std::floor(255.9999F * share));
+        }
+    return bytes;
+}
+
+std::vector<fs::path> map_files(const std::string& name, const rasters::Grid& grid, const MapSettings& settings,
+                                const fs::path& folder) {
+    const Settings walk = with_radius(settings.walk, grid);
+    std::vector<fs::path> files;
+    for (const std::string& layer : settings.write) {
+        files.push_back(folder / map_file_name(name, layer, walk, radius_in_cells(walk, grid), false));
+        if (settings.bytes && row_of(layer).layer)
+            files.push_back(folder / map_file_name(name, layer, walk, radius_in_cells(walk, grid), true));
+    }
+    return files;
+}
+
+std::vector<fs::path> write_maps(const std::string& name, const rasters::Raster& raster, const cv::Mat1b& source,
+                                 const MapSettings& settings, const fs::path& folder) {
+    const Settings walk = with_radius(settings.walk, raster.grid);
+    Wanted wanted;
+    for (const std::string& layer : settings.write)
+        if (row_of(layer).wanted)
+            wanted.*row_of(layer).wanted = true;
+    Layers layers = layers_of({raster.z, raster.grid.cell}, in_units_of(raster.grid, walk), wanted);
+    const double radius = radius_in_cells(walk, raster.grid);
+    std::vector<fs::path> files;
+    const auto write = [&](const std::string& layer, const cv::Mat& values, bool bytes) {
+        files.push_back(folder / map_file_name(name, layer, walk, radius, bytes));
+        rasters::write_raster(files.back(), values, raster.grid, text_of(layer, walk));
+    };
+    for (const std::string& layer : settings.write) {
+        const MapRow& row = row_of(layer);
+        if (row.layer) {
+            cv::Mat1f& values = layers.*row.layer;
+            write(layer, values, false);
+            if (settings.bytes)
+                write(layer, stretched(values, layer), true);
+            values.release();
+        } else if (layer == "dtm") {
+            write(layer, raster.base == 0 ? cv::Mat(raster.z) : cv::Mat(raster.z + raster.base), false);
+        } else {
+            write(layer, source.empty() ? cv::Mat1b((raster.z == raster.z) / 255) : source, false);
+        }
+    }
+    return files;
+}
+
+} // namespace scanshade::relief

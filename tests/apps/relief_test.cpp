@@ -1,0 +1,211 @@
+// `scanshade relief`: names, stretches and units of maps, surfaces of points, and the program on files.
+#include "apps/command.h"
+#include "apps/relief/ground_filter.h"
+#include "apps/relief/maps.h"
+#include "apps/relief/surface.h"
+#include "io/clouds/cloud_file.h"
+#include "tests/support/files.h"
+
+#include <cmath>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <random>
+
+namespace scanshade::relief {
+namespace {
+
+namespace fs = std::filesystem;
+using tests::refusal;
+using tests::says;
+
+/// What the toolbox calls its results.
+TEST(Relief, maps_are_named_as_the_toolbox_names_them) {
+    horizon::Settings s;
+    const auto name = [&](const char* layer, bool bytes) { return map_file_name("dem", layer, s, 10, bytes); };
+    EXPECT_EQ(name("svf", false), "dem_SVF_R10_D16.tif");
+    EXPECT_EQ(name("svf", true), "dem_SVF_R10_D16_8bit.tif");
+    EXPECT_EQ(name("asvf", false), "dem_SVF-A_R10_D16_A315_ALlow.tif");
+    EXPECT_EQ(name("dominance", true), "dem_LD_R_M10-20_DI1_A15_OH1.7_8bit.tif");
+    EXPECT_EQ(name("ao", false), "dem_AO_R10.tif");
+    s.noise = horizon::Noise::high;
+    EXPECT_EQ(name("openness", false), "dem_OPEN-POS_R10_D16_NRhigh.tif");
+    EXPECT_EQ(name("openness-neg", true), "dem_OPEN-NEG_R10_D16_NRstrong_8bit.tif");
+    EXPECT_EQ(name("asvf", false), "dem_SVF-A_R10_D16_A315_ALlow_NRhigh.tif");
+    EXPECT_EQ(name("dominance", false), "dem_LD_R_M10-20_DI1_A15_OH1.7.tif");
+}
+
+TEST(Relief, stretches_reach_both_ends_and_unknown_is_255) {
+    const cv::Mat1f svf = (cv::Mat1f(1, 4) << 0.5, 0.6375, 1, NAN);
+    const cv::Mat1b bytes = stretched(svf, "svf");
+    EXPECT_EQ(cv::norm(bytes, cv::Mat1b((cv::Mat1b(1, 4) << 0, 0, 255, 255)), cv::NORM_INF), 0);
+    const cv::Mat1f degrees = (cv::Mat1f(1, 3) << 50, 77.5, 95);
+    const cv::Mat1b inverted = stretched(degrees, "openness-neg");
+    EXPECT_EQ(cv::norm(inverted, cv::Mat1b((cv::Mat1b(1, 3) << 255, 127, 0)), cv::NORM_INF), 0);
+}
+
+rasters::Crs crs_with(std::initializer_list<std::pair<int, int>> values) {
+    rasters::GeoKeys keys;
+    for (const auto& [key, value] : values)
+        keys = rasters::with_value(std::move(keys), key, value);
+    return rasters::crs_of_keys(std::move(keys));
+}
+
+TEST(Relief, radii_are_metres_and_heights_come_to_the_unit_of_the_plane) {
+    rasters::Grid grid;
+    grid.cell = 2;
+    grid.crs = crs_with({{1024, 1}, {1025, 1}, {3072, 2264}, {4096, 5703}}); // US survey feet, heights in metres
+    horizon::Settings settings;
+    settings.radius = 10;
+    const horizon::Settings own = in_units_of(grid, settings);
+    const double foot = 1200.0 / 3937;
+    EXPECT_NEAR(own.radius, 10 / foot, 1e-9);
+    EXPECT_NEAR(own.exaggeration, 1 / foot, 1e-9);
+    EXPECT_NEAR(own.dominance.observer, 1.7 / foot, 1e-9);
+}
+
+double ground_at(double x, double y) { return 100 + 0.3 * x - 0.2 * y; }
+
+/// A sloping ground of 4 points a square metre, with a hole, and trees above.
+SurveyPoints made_survey(bool classified) {
+    SurveyPoints survey;
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> uniform(0, 60);
+    for (int i = 0; i < 60 * 60 * 4; ++i) {
+        const double x = uniform(random), y = uniform(random);
+        if (std::hypot(x - 15, y - 15) < 5)
+            continue;
+        const bool tree = std::hypot(x - 40, y - 40) < 4 && i % 3 != 0; // some pulses reach the ground
+        survey.points.emplace_back(x, y, ground_at(x, y) + (tree ? 8 : 0));
+        survey.classes.push_back(!classified ? 1 : tree ? 5 : 2);
+    }
+    survey.ground_classified = classified;
+    return survey;
+}
+
+double worst_to_ground(const SurfaceRaster& surface, int margin) {
+    double worst = 0;
+    const rasters::Raster& raster = surface.raster;
+    for (int r = margin; r < raster.z.rows - margin; ++r)
+        for (int c = margin; c < raster.z.cols - margin; ++c)
+            if (!std::isnan(raster.z(r, c)))
+                worst = std::max(worst, std::abs(raster.z(r, c) + raster.base -
+                                                 ground_at(raster.grid.x0 + (c + 0.5) * raster.grid.cell,
+                                                           raster.grid.y0 - (r + 0.5) * raster.grid.cell)));
+    return worst;
+}
+
+/// A plane stays a plane: triangles are read at the centres of cells, wherever their points lie.
+TEST(Relief, ground_is_read_at_the_centres_of_cells) {
+    const SurfaceRaster surface = surface_of(made_survey(true), {.cell_m = 0.5});
+    EXPECT_EQ(surface.raster.z.size(), cv::Size(120, 120));
+    EXPECT_EQ(surface.raster.grid.x0, 0);
+    EXPECT_EQ(surface.raster.grid.y0, 60);
+    EXPECT_LT(worst_to_ground(surface, 2), 1e-3);
+}
+
+TEST(Relief, gaps_are_filled_within_a_limit_and_marked) {
+    const SurfaceRaster surface = surface_of(made_survey(true), {.cell_m = 1, .fill_m = 3});
+    const auto source_at = [&](double x, double y) {
+        return Source(surface.source(59 - static_cast<int>(y), static_cast<int>(x)));
+    };
+    EXPECT_EQ(source_at(15, 15), Source::nothing); // 5 m from the nearest point
+    EXPECT_TRUE(std::isnan(surface.raster.z(59 - 15, 15)));
+    EXPECT_EQ(source_at(15, 18), Source::interpolated);
+    EXPECT_EQ(source_at(30, 30), Source::measured);
+    const SurfaceRaster whole = surface_of(made_survey(true), {.cell_m = 1, .fill_m = 8});
+    EXPECT_LT(worst_to_ground(whole, 1), 1e-3);
+    EXPECT_EQ(cv::countNonZero(whole.source == 0), 0);
+}
+
+TEST(Relief, trees_are_the_top_and_no_ground_with_classes_or_without) {
+    const auto at_tree = [](const SurfaceRaster& surface) {
+        return surface.raster.z(59 - 40, 40) + surface.raster.base;
+    };
+    EXPECT_NEAR(at_tree(surface_of(made_survey(true), {.surface = Surface::top, .cell_m = 1})),
+                ground_at(40.5, 40.5) + 8, 0.5);
+    const SurfaceRaster unclassified = surface_of(made_survey(false), {.cell_m = 1});
+    EXPECT_NEAR(at_tree(unclassified), ground_at(40.5, 40.5), 0.05);
+    EXPECT_TRUE(tests::warned(unclassified.raster.notes, "progressive morphological filter"));
+}
+
+TEST(Relief, the_filter_removes_a_building_without_points_of_ground_below) {
+    cv::Mat1f lowest(60, 60);
+    for (int r = 0; r < 60; ++r)
+        for (int c = 0; c < 60; ++c)
+            lowest(r, c) = 100 + 0.1F * static_cast<float>(c) + (r > 20 && r < 30 && c > 20 && c < 35 ? 6.0F : 0.0F);
+    lowest(5, 5) = NAN;
+    const cv::Mat1f ground = opened_ground(lowest, 1, 20);
+    EXPECT_LT(ground(25, 28), 100 + 2.8 + 2); // the building is gone, give or take the slope within a window
+    EXPECT_NEAR(ground(50, 50), 105, 0.3);
+}
+
+TEST(Relief, survey_without_points_of_the_surface_is_refused) {
+    SurveyPoints survey = made_survey(true);
+    std::ranges::fill(survey.classes, std::uint8_t(5));
+    EXPECT_TRUE(says(refusal([&] { (void)surface_of(survey, {.cell_m = 1}); }), "no point is of the surface"));
+    EXPECT_TRUE(says(refusal([&] { (void)surface_of(made_survey(true), {.cell_m = 1e-4}); }), "larger --cell"));
+}
+
+tests::Ran run_relief(const std::string& words) { return tests::run_program("relief " + words); }
+
+fs::path made_dem(const fs::path& file) {
+    cv::Mat1f z(40, 50);
+    cv::randu(z, 300, 304);
+    z(4, 5) = NAN;
+    rasters::Grid grid;
+    grid.x0 = 500000.5, grid.y0 = 5200000, grid.cell = 0.5;
+    grid.crs = crs_with({{1024, 1}, {1025, 1}, {3072, 32633}, {3076, 9001}});
+    rasters::write_raster(file, z, grid, {});
+    return file;
+}
+
+TEST(Relief, the_program_writes_maps_in_the_place_of_the_dem) {
+    const tests::TemporaryFolder folder;
+    const fs::path dem = made_dem(folder / "dem.of.1.tif");
+    const tests::Ran ran =
+        run_relief(fmt::format("{} -o {} --write svf,ao,dtm,8bit --radius 5", dem.string(), (folder / "out").string()));
+    EXPECT_EQ(ran.exit_code, all_well) << ran.err;
+    const rasters::Raster before = rasters::read_raster(dem);
+    for (const char* name : {"dem_SVF_R10_D16.tif", "dem_AO_R10.tif", "dem_DTM.tif"}) {
+        const rasters::Raster map = rasters::read_raster(folder / "out" / name);
+        EXPECT_EQ(map.z.size(), before.z.size());
+        EXPECT_EQ(map.grid.x0, before.grid.x0);
+        EXPECT_EQ(map.grid.y0, before.grid.y0);
+        EXPECT_EQ(map.grid.crs.keys.directory, before.grid.crs.keys.directory);
+        EXPECT_TRUE(std::isnan(map.z(4, 5)));
+        EXPECT_GT(map.z(20, 20), 0);
+    }
+    EXPECT_TRUE(fs::exists(folder / "out" / "dem_SVF_R10_D16_8bit.tif"));
+}
+
+TEST(Relief, exit_codes_tell_misuse_from_bad_inputs) {
+    const tests::TemporaryFolder folder;
+    const std::string dem = made_dem(folder / "dem.tif").string(), out = (folder / "out").string();
+    const std::string bad = tests::write_file(folder / "bad.tif", std::string("II*\0garbage", 11)).string();
+    EXPECT_EQ(run_relief(dem).exit_code, misuse);
+    EXPECT_EQ(run_relief(fmt::format("{} -o {} --write sfv", dem, out)).exit_code, misuse);
+    EXPECT_EQ(run_relief(fmt::format("{} -o {} --dominance 1,2", dem, out)).exit_code, misuse);
+    EXPECT_EQ(run_relief(fmt::format("{} -o {} --radius 0.1", dem, out)).exit_code, misuse); // less than a cell
+    const tests::Ran some = run_relief(fmt::format("{} {} -o {}", dem, bad, out));
+    EXPECT_EQ(some.exit_code, some_failed);
+    EXPECT_TRUE(says(some.err, "bad.tif"));
+    const tests::Ran again = run_relief(fmt::format("{} -o {}", dem, out));
+    EXPECT_EQ(again.exit_code, nothing_done);
+    EXPECT_TRUE(says(again.err, "--overwrite"));
+    EXPECT_EQ(run_relief(fmt::format("{} -o {} --overwrite", dem, out)).exit_code, all_well);
+}
+
+TEST(Relief, the_program_maps_any_cloud) {
+    const tests::TemporaryFolder folder;
+    const SurveyPoints survey = made_survey(false);
+    write_new_ply(folder / "scan.ply", survey.points, {}, {});
+    const tests::Ran ran = run_relief(fmt::format("{} -o {} --surface top --cell 1 --write svf,source,dtm",
+                                                  (folder / "scan.ply").string(), (folder / "out").string()));
+    EXPECT_EQ(ran.exit_code, all_well) << ran.err;
+    EXPECT_TRUE(says(ran.err, "no coordinate system"));
+    EXPECT_EQ(rasters::read_raster(folder / "out" / "scan_SOURCE.tif").z.size(), cv::Size(60, 60));
+    EXPECT_LT(rasters::read_raster(folder / "out" / "scan_SVF_R10_D16.tif").z(59 - 35, 40), 0.9F); // beside the trees
+}
+
+} // namespace
+} // namespace scanshade::relief
