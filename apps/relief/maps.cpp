@@ -107,6 +107,13 @@ rasters::RasterText text_of(const std::string& layer, const Settings& s) {
     return text;
 }
 
+/// What `source` says of a raster: 1 where it has heights.
+cv::Mat1b measured_cells(const cv::Mat1f& z) {
+    cv::Mat1b measured(z.size());
+    std::transform(z.begin(), z.end(), measured.begin(), [](float height) { return std::isnan(height) ? 0 : 1; });
+    return measured;
+}
+
 /// The radius in metres that is asked for; 10 cells where none is.
 Settings with_radius(Settings settings, const rasters::Grid& grid) {
     constexpr double usual_cells = 10;
@@ -196,7 +203,7 @@ std::vector<fs::path> write_maps(const std::string& name, const rasters::Raster&
         } else if (layer == "dtm") {
             write(layer, raster.base == 0 ? cv::Mat(raster.z) : cv::Mat(raster.z + raster.base), false);
         } else {
-            write(layer, source.empty() ? cv::Mat1b((raster.z == raster.z) / 255) : source, false);
+            write(layer, source.empty() ? measured_cells(raster.z) : source, false);
         }
     }
     return files;

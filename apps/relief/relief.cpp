@@ -43,7 +43,7 @@ struct Inputs {
 };
 
 void add_input(Inputs& inputs, const fs::path& path, bool must_be) {
-    if (rasters::is_tiff(path))
+    if (rasters::is_tiff(path) || (must_be && lower_extension(path) == ".vrt"))
         inputs.rasters.push_back(path);
     else if (has_cloud_extension(path))
         inputs.clouds.push_back(path);

@@ -27,9 +27,9 @@ struct Raster {
 };
 
 /// Reads one band of a GeoTIFF: strips or tiles, integers or floats of 1 to 8 bytes, either byte order, BigTIFF, nodata
-/// values, masks, scale and offset, area or point; without tags a world file with .prj, or .aux.xml. `band` counts from
-/// 1; 0 = the only one. Throws Error naming the file for what is damaged, and for rasters in degrees, turned, oblong,
-/// or of several bands without `band`.
+/// values, masks, scale and offset, area or point; without tags a world file with .prj, or .aux.xml. Or parts of
+/// several, put side by side by GDAL's virtual raster (.vrt). `band` counts from 1; 0 = the only one. Throws Error
+/// naming the file for what is damaged, and for rasters in degrees, turned, oblong, or of several bands without `band`.
 [[nodiscard]] Raster read_raster(const std::filesystem::path& file, int band = 0);
 
 /// Whether the file begins as a TIFF does.

@@ -4,6 +4,7 @@
 #include "io/files.h"
 #include "io/images/image_check.h"
 #include "io/rasters/tiff.h"
+#include "io/rasters/vrt.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
@@ -393,6 +394,8 @@ bool is_tiff(const fs::path& file) {
 }
 
 Raster read_raster(const fs::path& file, int band) {
+    if (is_vrt(file))
+        return read_vrt(file, band);
     TiffInput tiff(file);
     Raster raster;
     while ((tiff.number(TIFFTAG_SUBFILETYPE, 0) & (reduced | mask)) != 0)

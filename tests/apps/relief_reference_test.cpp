@@ -174,7 +174,7 @@ TEST(ReliefReference, the_same_terrain_in_any_file_has_the_same_view) {
     const cv::Mat1f terrain = view("terrain.tif"), holes = view("terrain_holes_nan.tif");
     for (const char* name : {"terrain_big_endian.tif", "terrain_bigtiff.tif", "terrain_cog.tif", "terrain_point.tif",
                              "terrain_tiled_lzw.tif", "terrain_tiepoint_inside.tif", "terrain_transformation.tif",
-                             "terrain_half_offset.tif", "no_crs.tif"})
+                             "terrain_half_offset.tif", "no_crs.tif", "terrain_two.vrt"})
         EXPECT_EQ(difference(view(name), terrain, 0).worst, 0) << name;
     for (const char* name : {"terrain_us_feet.tif", "terrain_feet_z_metres.tif"}) // heights rounded in feet
         EXPECT_LT(difference(view(name), terrain, 0).worst, 2e-4) << name;

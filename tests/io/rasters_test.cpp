@@ -261,6 +261,40 @@ TEST(Rasters, what_cannot_be_a_height_field_of_square_cells_is_refused) {
     EXPECT_TRUE(says(refusal([&] { (void)read_raster(short_of.write("four_bits.tif")); }), "4 bits"));
 }
 
+std::string vrt_of(const std::string& sources, const std::string& transform = "500000.5, 0.5, 0, 5200040.25, 0, -0.5") {
+    return "<VRTDataset rasterXSize=\"53\" rasterYSize=\"37\"><GeoTransform>" + transform +
+           "</GeoTransform><VRTRasterBand dataType=\"Float32\" band=\"1\">" + sources + "</VRTRasterBand></VRTDataset>";
+}
+
+std::string vrt_source(const std::string& name, int from, int to, int width, int shown_width) {
+    const auto rect = [](const char* kind, int x, int w) {
+        return "<" + std::string(kind) + " xOff=\"" + std::to_string(x) + "\" yOff=\"0\" xSize=\"" + std::to_string(w) +
+               "\" ySize=\"37\"/>";
+    };
+    return "<SimpleSource><SourceFilename relativeToVRT=\"1\">" + name + "</SourceFilename><SourceBand>1</SourceBand>" +
+           rect("SrcRect", from, width) + rect("DstRect", to, shown_width) + "</SimpleSource>";
+}
+
+TEST(Rasters, virtual_rasters_join_their_sources) {
+    write_raster(folder() / "west.tif", heights().colRange(0, 30).clone(), grid(), {});
+    write_raster(folder() / "east.tif", heights().colRange(20, 53).clone(), grid(), {});
+    const fs::path path = folder() / "both.vrt";
+    tests::write_file(path, vrt_of(vrt_source("west.tif", 0, 0, 30, 30) + vrt_source("east.tif", 5, 25, 28, 28)));
+    const Raster raster = read_raster(path);
+    EXPECT_TRUE(same(raster.z, heights()));
+    EXPECT_EQ(raster.grid.x0, grid().x0);
+    EXPECT_EQ(raster.grid.y0, grid().y0);
+    const auto refused = [&](const std::string& text) {
+        return refusal([&] { (void)read_raster(tests::write_file(folder() / "bad.vrt", text)); });
+    };
+    EXPECT_TRUE(says(refused(vrt_of(vrt_source("west.tif", 0, 0, 30, 15))), "1:1"));
+    EXPECT_TRUE(says(refused(vrt_of(vrt_source("west.tif", 0, 40, 30, 30))), "outside"));
+    EXPECT_TRUE(says(refused(vrt_of(vrt_source("bad.vrt", 0, 0, 30, 30))), "virtual raster, too"));
+    EXPECT_TRUE(says(refused(vrt_of(vrt_source("west.tif", 0, 0, 30, 30), "0, 1, 0.5, 0, 0, -1")), "north up"));
+    EXPECT_TRUE(says(refused(vrt_of("")), "without sources"));
+    EXPECT_TRUE(says(refused("<VRT"), "no XML"));
+}
+
 TEST(Rasters, cut_files_are_refused_wherever_they_end) {
     const fs::path whole = folder() / "whole.tif";
     write_raster(whole, heights(), grid(), {"text", {}});
