@@ -12,6 +12,8 @@
 #include <fmt/ranges.h>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <utility>
 
 namespace scanshade {
 
@@ -335,36 +337,29 @@ std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& im
     return doubts;
 }
 
-/// Of floats but 0, backgrounds, infinities and NaN.
-struct Signs {
-    std::size_t positive = 0, negative = 0;
-    float least = 0, nearest = std::numeric_limits<float>::lowest(); ///< of the negative ones
-};
-
-Signs signs_of(const cv::Mat1f& stored) {
-    Signs signs;
+/// The least and the largest of negative numbers, where there are no positive ones but backgrounds; else nothing.
+std::optional<std::pair<float, float>> all_negative(const cv::Mat1f& stored) {
+    float least = 0, nearest = std::numeric_limits<float>::lowest();
     for (const float value : stored) {
-        signs.positive += value > 0 && std::isfinite(value) && !is_background(value);
+        if (value > 0 && std::isfinite(value) && !is_background(value))
+            return std::nullopt;
         if (!(value < 0 && std::isfinite(value)))
             continue;
-        ++signs.negative;
-        signs.least = std::min(signs.least, value);
-        signs.nearest = std::max(signs.nearest, value);
+        least = std::min(least, value);
+        nearest = std::max(nearest, value);
     }
-    return signs;
+    return least < 0 ? std::optional(std::pair(least, nearest)) : std::nullopt;
 }
 
 } // namespace
 
 cv::Mat looking_along_z(const cv::Mat& stored, std::vector<std::string>& warnings) {
-    if (stored.type() != CV_32FC1)
-        return stored;
-    const Signs signs = signs_of(cv::Mat1f(stored));
-    if (signs.positive > 0 || signs.negative == 0 || signs.least == signs.nearest)
+    const auto range = stored.type() == CV_32FC1 ? all_negative(cv::Mat1f(stored)) : std::nullopt;
+    if (!range || range->first == range->second)
         return stored;
     warnings.push_back(fmt::format("all depths are negative ({:.3g} .. {:.3g}), as z of cameras that look along -z "
                                    "(OpenGL): taken without their signs.",
-                                   signs.least, signs.nearest));
+                                   range->first, range->second));
     return -stored;
 }
 
