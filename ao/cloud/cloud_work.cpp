@@ -580,8 +580,11 @@ CloudWork::Fitted CloudWork::planes_of(const Indices& which, CloudGpu* gpu) {
         for (const std::uint32_t point : fitted.fitted_of)
             ++count[point];
         surface.stands_for.resize(surface.size());
+        surface.noise.resize(fitted.sigma.empty() ? 0 : surface.size());
         for (std::size_t i = 0; i < surface.size(); ++i) {
             surface.stands_for[i] = count[surface.tree.original(i)];
+            if (!surface.noise.empty())
+                surface.noise[i] = fitted.sigma[surface.tree.original(i)];
             if (fitted.alone[surface.tree.original(i)])
                 surface.disc_radius[i] = 0;
             else if (!fitted.largest_disc.empty())

@@ -1,6 +1,8 @@
 // Which rule turns a surface's normals, and whether recorded ones are believed.
 #include "ao/cloud/settled_sides.h"
 
+#include "ao/cloud/sides/noise_camera.h"
+
 #include <algorithm>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
@@ -70,6 +72,13 @@ Sides SettledSides::found_in(const CloudSurface& surface, const Patches& patches
         return sides_of(surface, patches, nullptr, orientation.point.cast<float>().normalized(), SidesRule::up);
     if (!rays)
         rays.emplace(surface);
+    if (orientation.kind == Kind::automatic && !surface.noise.empty())
+        if (const auto camera = camera_of_noise(surface, *rays)) {
+            Sides sides = sides_to(surface, camera->position);
+            sides.why = fmt::format("to the place from where their noise grows, which sees {:.0f} % of them",
+                                    100 * camera->seen);
+            return sides;
+        }
     const std::optional<Vector3f> up =
         orientation.kind == Kind::terrain || z_up_ ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
     const SidesRule rule = orientation.kind == Kind::terrain   ? SidesRule::terrain

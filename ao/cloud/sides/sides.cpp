@@ -107,7 +107,9 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
             decision.why = fmt::format("outward, as of a body: {:.0f} % of it is seen from all round", 100 * afar);
         else
             decision.why = "to the outer side of a shell";
-        if (room ? !sure_room : !body || boxed > walled || within > std::max(scanned_within, outside))
+        const bool like_room = boxed > walled || within > std::max(scanned_within, outside);
+        const bool too_low = empty_within && scene.smallest < lowest_room; // for a room without a gap
+        if (room ? !sure_room : !body || (like_room && !too_low))
             decision.doubt = fmt::format("both sides of all surfaces could be the scanned one, as of a room and of a "
                                          "body of its shape: the {} one was taken; --cloud.outside sets it.",
                                          room ? "inner" : "outer");

@@ -532,7 +532,6 @@ class Cleaning {
     [[nodiscard]] FittedCloud gathered() const {
         FittedCloud fitted;
         std::vector<Vector3f> positions;
-        std::vector<float> sigmas;
         constexpr float widest = 1.3F; // of a voxel's side: wires and flying pixels are no ribbons
         for (std::size_t k = 0; k < discs_.size(); ++k) {
             positions.push_back(discs_[k].at);
@@ -541,12 +540,12 @@ class Cleaning {
             if (with_normals_)
                 fitted.normals.push_back(discs_[k].normal.cast<double>());
             fitted.largest_disc.push_back(widest * discs_[k].side);
-            sigmas.push_back(discs_[k].sigma);
+            fitted.sigma.push_back(discs_[k].sigma);
         }
         if (positions.empty())
             return {};
         fitted.alone.assign(positions.size(), 0);
-        fitted.noise = median(sigmas);
+        fitted.noise = median(std::vector(fitted.sigma));
         fitted.fitted_of.resize(points_.size());
         const NeighbourTree tree(positions);
         std::vector<char> gone(moved_.size());

@@ -49,6 +49,7 @@ struct CloudSurface {
     Untouched<float> roughness;         ///< one sigma of the neighbours' distances from the plane, in the cloud's unit
     Untouched<float> flatness; ///< 1 - 3 times the surface variation (Pauly, Gross and Kobbelt 2002): 1 = a plane
     std::vector<std::uint32_t> stands_for; ///< how many points recorded; empty = one each
+    std::vector<float> noise{};            ///< sigma, where it exceeds the spacing; else empty
     float spacing = 0;                     ///< median distance of points: the side of a square that holds one
     double agreement = 1; ///< median |cosine| between given normals and planes: near 1/2 where the given ones are noise
 

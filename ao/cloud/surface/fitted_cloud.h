@@ -18,6 +18,7 @@ struct FittedCloud {
     std::vector<Eigen::Vector3d> normals; ///< the mean of the recorded ones; empty where none are given
     std::vector<Eigen::Vector3f> axes;    ///< fitted, not oriented; zero for points that no noise concerns
     std::vector<char> alone;              ///< 1: off all surfaces near it by more than noise explains
+    std::vector<float> sigma;             ///< of the noise round them; empty where it is below the spacing
     std::vector<float> largest_disc;      ///< radii that no disc may exceed; empty = any
     std::vector<std::uint32_t> fitted_of; ///< by point given: its index in `points`
     float noise = 0;                      ///< sigma across the surface, the median over the cloud, in its unit
