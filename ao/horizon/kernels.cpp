@@ -82,6 +82,15 @@ INLINE void start(Horizons& found, int count) {
 }
 
 template <bool both>
+INLINE void raise_inner(const Cells& cells, const InnerSample& inner, std::ptrdiff_t stride,
+                        Horizons& __restrict found) {
+    const float* __restrict z = cells.z;
+    const InnerSample sample = inner; // in registers: what is written could be part of it otherwise
+    for (int x = 0, count = cells.count; x < count; ++x)
+        raise<both>(slope(z + x, sample, stride), found.high[x], found.low[x]);
+}
+
+template <bool both>
 INLINE void look(const Cells& cells, const Ray& ray, Horizons& found) {
     start(found, cells.count);
     Row slopes;
@@ -97,10 +106,8 @@ INLINE void look(const Cells& cells, const Ray& ray, Horizons& found) {
             slopes_of(cells, samples[i], slopes);
             raise<both>(slopes, cells.count, found);
         }
-    for (const InnerSample& sample : ray.inner) {
-        slopes_of(cells, sample, ray.stride, slopes);
-        raise<both>(slopes, cells.count, found);
-    }
+    for (const InnerSample& sample : ray.inner)
+        raise_inner<both>(cells, sample, ray.stride, found);
 }
 
 INLINE void look(const Cells& cells, const Ray& ray, bool both, Horizons& found) {
