@@ -1,11 +1,11 @@
 #include "projection/pixel_cloud.h"
 
+#include "projection/base/comb.h"
 #include "projection/base/line_fit.h"
 #include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <cstdint>
 #include <numbers>
 #include <span>
@@ -93,11 +93,8 @@ struct Axis {
     [[nodiscard]] int pixel(double tangent) const { return static_cast<int>(std::lround(line.at(tangent))); }
 };
 
-/// The number of pixels per unit of tangent, near a guess, at which most tangents are at the same place in their pixel;
-/// and that place, in pixels. Nothing where they are anywhere.
-struct Comb {
-    double per_unit = 0, place = 0;
-};
+/// The number of pixels per unit of tangent, near a guess, at which most tangents are at the same place in their pixel.
+/// Nothing where they are anywhere.
 std::optional<Comb> comb_of(const std::vector<double>& tangents, double guess, double extent) {
     constexpr std::size_t sample = 2048;
     constexpr double search = 0.1, fine = 0.15, alike = 0.8;
@@ -108,18 +105,11 @@ std::optional<Comb> comb_of(const std::vector<double>& tangents, double guess, d
             tangents[static_cast<std::size_t>((turns - std::floor(turns)) * static_cast<double>(tangents.size()))]);
     }
     Comb best;
-    double most = 0;
     const double step = fine / extent;
-    for (double per_unit = (1 - search) * guess; per_unit <= (1 + search) * guess; per_unit += step) {
-        std::complex<double> sum = 0;
-        for (const double tangent : some)
-            sum += std::polar(1.0, 2 * std::numbers::pi * per_unit * tangent);
-        if (std::abs(sum) > most) {
-            most = std::abs(sum);
-            best = {per_unit, std::arg(sum) / (2 * std::numbers::pi)};
-        }
-    }
-    return most > alike * sample ? std::optional(best) : std::nullopt;
+    for (double per_unit = (1 - search) * guess; per_unit <= (1 + search) * guess; per_unit += step)
+        if (const Comb comb = comb_at(some, per_unit); comb.alike > best.alike)
+            best = comb;
+    return best.alike > alike ? std::optional(best) : std::nullopt;
 }
 
 std::optional<Axis> axis_of(const std::vector<double>& tangents, double pitch) {
