@@ -81,11 +81,11 @@ SequenceAo FrameAo::sequence(double radius_m, const DepthNoise& noise, const Seq
     return {*device_, method_, radius_m, noise, preparation_, options};
 }
 
-std::unique_ptr<PointMethod> point_method(const MethodSetup& setup, const CloudAoOptions& options,
-                                          gpu::Device* device) {
+std::unique_ptr<PointMethod> point_method(const MethodSetup& setup, const CloudAoOptions& options, gpu::Device* device,
+                                          const MergedImages& images) {
     if (std::unique_ptr<PointMethod> own = setup.make_for_points())
         return own;
-    return std::make_unique<CloudAo>(options, device);
+    return std::make_unique<MergedCloudAo>(options, device, images);
 }
 
 } // namespace scanshade

@@ -7,6 +7,7 @@
 #include "ao/expected_errors.h"
 #include "ao/finish/finish.h"
 #include "ao/fit_plane/fit_plane.h"
+#include "ao/merged_cloud.h"
 #include "ao/sequence/sequence_ao.h"
 
 #include <memory>
@@ -79,9 +80,9 @@ class FrameAo {
     Timings timings_;
 };
 
-/// How points are computed: by the method itself where it needs no view, else by rays from every point. `device` = null
-/// casts them on the processor.
+/// How points are computed: by the method itself where it needs no view, else by rays from every point, and by images
+/// where depth frames are found in the cloud. `device` = null casts rays on the processor.
 [[nodiscard]] std::unique_ptr<PointMethod> point_method(const MethodSetup& setup, const CloudAoOptions& options,
-                                                        gpu::Device* device);
+                                                        gpu::Device* device, const MergedImages& images);
 
 } // namespace scanshade

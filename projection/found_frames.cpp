@@ -678,7 +678,7 @@ cv::Mat1f FoundFrames::depth(std::size_t index, Points points) const {
     const FoundFrame& of = frames[index];
     cv::Mat1f z(of.camera.size, 0.0F);
     const Isometry3d camera_from_world = of.world_from_camera.inverse();
-    for (std::size_t i = 0; i < points.size(); ++i)
+    for (std::size_t i = of.first; i < of.last; ++i)
         if (frame[i] == static_cast<std::int32_t>(index))
             z(pixel[i] / z.cols, pixel[i] % z.cols) = static_cast<float>((camera_from_world * points[i]).z());
     return z;
@@ -714,7 +714,11 @@ std::optional<FoundFrames> found_frames(Points points) {
     result.pixel.assign(points.size(), -1);
     for (std::size_t i = 0; i < found.size(); ++i) {
         const View& view = found[i].view;
-        FoundFrame made{{view.fx, view.fy, view.cx - grid.left, view.cy - grid.top, size}, view.world_from_camera};
+        const Range& range = found[i].range;
+        FoundFrame made{{view.fx, view.fy, view.cx - grid.left, view.cy - grid.top, size},
+                        view.world_from_camera,
+                        numbers[range.first],
+                        numbers[range.last - 1] + std::size_t(1)};
         made.world_from_camera.translation() += middle;
         result.frames.push_back(made);
         take_pixels(result, found[i], i, finite, grid, numbers);

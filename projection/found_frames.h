@@ -16,6 +16,7 @@ namespace scanshade {
 struct FoundFrame {
     Pinhole camera; ///< of the same size in all frames of a cloud; pixels are those that were written: strides count
     Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
+    std::size_t first = 0, last = 0; ///< its points are among these; `last` is one past them
 };
 
 struct FoundFrames {
@@ -39,9 +40,9 @@ struct FoundFrames {
 /// 4. The width of pixels in a row shrinks with the cosine of the row's angle, which tells the optical axis.
 /// 5. Least squares of the pixels of all points, over a part that grows to the whole frame.
 ///
-/// Nothing where fewer than four frames' worth of places hold such rows or hardly any point is on a whole pixel, to a
-/// fifth: clouds in another order, laser scans, means of voxels. A part of the points does, if their order is kept.
-/// Coordinates may be rounded to about 1/20,000 of their distance.
+/// A frame counts if 90 % of its points are on whole pixels, to a fifth. Nothing where none of four places in the cloud
+/// holds one: clouds in another order, laser scans. A part of the points does, if their order is kept, and coordinates
+/// may be rounded to about 1/20,000 of their distance.
 [[nodiscard]] std::optional<FoundFrames> found_frames(std::span<const Eigen::Vector3d> points);
 
 } // namespace scanshade

@@ -133,6 +133,7 @@ struct PointSet {
     std::span<const std::array<int, 3>> triangles = {};
     bool z_up = false;         ///< whether z is known to point to the sky
     bool from_scanner = false; ///< whether all were surely seen from the scanner's position, as in a lidar's sweep
+    std::span<const Eigen::Vector3d> seen_from = {}; ///< the camera of each, where cameras are known; else empty
 };
 
 /// Values of points, and what was chosen on the way.

@@ -245,10 +245,13 @@ CloudWork::Picked CloudWork::picked(const Indices& indices) const {
     Picked some;
     some.points.resize(indices.size());
     some.normals.resize(cloud_.normals.empty() ? 0 : indices.size());
+    some.seen_from.resize(cloud_.seen_from.empty() ? 0 : indices.size());
     tbb::parallel_for(std::size_t(0), indices.size(), [&](std::size_t k) {
         some.points[k] = cloud_.points[indices[k]];
         if (!some.normals.empty())
             some.normals[k] = cloud_.normals[indices[k]];
+        if (!some.seen_from.empty())
+            some.seen_from[k] = cloud_.seen_from[indices[k]];
     });
     return some;
 }
@@ -258,8 +261,9 @@ CloudWork::Picked CloudWork::picked(const Indices& indices) const {
 void CloudWork::compute_strays() {
     if (strays_.size() < fewest_strays || role_ != Role::cloud)
         return;
-    const auto [points, normals] = picked(strays_);
-    const PointVisibility found = of_strays(setup_, {points, normals}, scanner_, result_.radius, result_.spacing);
+    const auto [points, normals, seen_from] = picked(strays_);
+    const PointVisibility found = of_strays(setup_, {.points = points, .normals = normals, .seen_from = seen_from},
+                                            scanner_, result_.radius, result_.spacing);
     for (std::size_t k = 0; k < strays_.size(); ++k) {
         result_.visibility[strays_[k]] = found.visibility[k];
         result_.error[strays_[k]] = found.error[k];
@@ -287,12 +291,12 @@ void CloudWork::compute_thinned() {
         return;
     const auto chosen = static_cast<std::uint64_t>(check.keep * 0x1p32);
     const Indices kept = indices_where(valid_, [&](std::uint32_t i) { return hash(i, 1U) < chosen; });
-    const auto [points, normals] = picked(kept);
+    const auto [points, normals, seen_from] = picked(kept);
     CloudAoOptions options = options_;
     options.keep_signs = false;
     if (sides_.recorded_kept)
         options.normals = CloudNormals::recorded;
-    const PointSet part{points, normals, {}, cloud_.z_up, cloud_.from_scanner};
+    const PointSet part{points, normals, {}, cloud_.z_up, cloud_.from_scanner, seen_from};
     const CloudSetup setup{options, setup_.device, setup_.up, setup_.viewpoint};
     CloudDecisions whole = decided_;
     whole.orientation = sides_.orientation;
@@ -353,7 +357,9 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
     const std::vector<std::uint32_t> lonely = drop_strays(surface, decided_.extent.centre, result_.spacing);
     std::optional<DiscRays> rays;
     std::vector<float> side_known;
-    if (!whole_)
+    if (!cloud_.seen_from.empty())
+        turn_to_cameras(surface, fitted, round);
+    else if (!whole_)
         side_known = sides_.settle(surface, rays, recorded());
     else if (!whole_->recorded_kept)
         side_known = sides_as_in_whole(surface);
@@ -518,6 +524,23 @@ std::vector<float> CloudWork::sides_as_in_whole(CloudSurface& surface) const {
             normal = -normal;
     });
     return known;
+}
+
+/// Each normal to the camera that saw its point, or one of those that the disc stands for. No side is wrong then.
+void CloudWork::turn_to_cameras(CloudSurface& surface, const FittedCloud& fitted, const Indices& round) {
+    std::vector<std::uint32_t> point_of(fitted.points.size());
+    for (std::size_t k = 0; k < round.size() && !fitted.empty(); ++k)
+        point_of[fitted.fitted_of[k]] = round[k];
+    tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
+        const std::size_t given = surface.tree.original(i);
+        const Vector3d& camera = cloud_.seen_from[fitted.empty() ? round[given] : point_of[given]];
+        const Vector3f to_camera = (camera - surface.middle).cast<float>() - surface.tree[i];
+        Vector3f& normal = surface.normals[i];
+        if (normal.dot(to_camera) < 0)
+            normal = -normal;
+    });
+    sides_.orientation.kind = NormalOrientation::Kind::viewpoint;
+    sides_.orientation.why = "the cameras that saw them";
 }
 
 void CloudWork::doubt_lines(const CloudSurface& surface) {

@@ -133,7 +133,7 @@ class CloudWork {
               Start start);
 
     struct Picked {
-        std::vector<Eigen::Vector3d> points, normals;
+        std::vector<Eigen::Vector3d> points, normals, seen_from;
     };
     struct Fitted {
         CloudSurface surface;
@@ -168,6 +168,7 @@ class CloudWork {
     void attach(const Fitted& planes, const Untouched<float>& values, const std::vector<float>& side_known,
                 const std::vector<float>& backs, const Indices& round, const Wanted& wanted);
     [[nodiscard]] std::vector<float> sides_as_in_whole(CloudSurface& surface) const;
+    void turn_to_cameras(CloudSurface& surface, const FittedCloud& fitted, const Indices& round);
     void doubt_lines(const CloudSurface& surface);
     void doubt(const std::string& sentence);
     [[nodiscard]] Fitted planes_of(const Indices& which, CloudGpu* gpu);

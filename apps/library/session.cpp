@@ -205,7 +205,8 @@ PointMethod& Session::points() {
     }
     const std::lock_guard alone(opening_);
     if (!points_)
-        points_ = point_method(asked_.chosen_setup(), asked_.cloud_ao(), gpu);
+        points_ = point_method(asked_.chosen_setup(), asked_.cloud_ao(), gpu,
+                               {[this]() -> gpu::Device& { return workers().device(); }, asked_.preparation()});
     return *points_;
 }
 

@@ -65,7 +65,12 @@ CaptureRuns::Prepared CaptureRuns::prepare(CaptureJob& job) {
     std::shared_ptr<MethodPool> methods =
         workers ? workers->pool_of(asked_.method, *setup, asked_.preparation()) : nullptr;
     gpu::Device* gpu = workers && !gpu::is_cpu(workers->device().info()) ? &workers->device() : nullptr;
-    auto points = point_method(*setup, asked_.cloud_ao(), gpu);
+    auto points = point_method(*setup, asked_.cloud_ao(), gpu,
+                               {[this]() -> gpu::Device& {
+                                    const std::lock_guard while_opening(alone_);
+                                    return this->workers().device();
+                                },
+                                asked_.preparation()});
     job.batch.points = points.get();
     for (std::string& warning : warnings_about(asked_, job.look, job.batch.radius_m))
         if (!std::ranges::count(job.capture.warnings, warning)) // once for all blocks

@@ -1,0 +1,245 @@
+// Clouds that were merged from depth frames.
+#include "ao/merged_cloud.h"
+
+#include "ao/cloud/cloud_notes.h"
+#include "ao/frame.h"
+#include "projection/base/error.h"
+#include "projection/base/spread.h"
+#include "projection/base/statistics.h"
+#include "projection/base/stopwatch.h"
+#include "projection/sensor/expected_error.h"
+#include "projection/sensor/noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Isometry3d, Eigen::Vector3d;
+
+/// The camera of every point; that of the point before it where it is on no pixel.
+std::vector<Vector3d> cameras_of(const FoundFrames& found) {
+    std::vector<Vector3d> cameras(found.frame.size());
+    std::size_t frame = 0;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+        if (found.frame[i] >= 0)
+            frame = static_cast<std::size_t>(found.frame[i]);
+        cameras[i] = found.frames[frame].world_from_camera.translation();
+    }
+    return cameras;
+}
+
+std::vector<Vector3d> turned_to(const std::vector<Vector3d>& cameras, const PointSet& cloud) {
+    std::vector<Vector3d> normals(cloud.normals.begin(), cloud.normals.end());
+    for (std::size_t i = 0; i < normals.size(); ++i)
+        if (normals[i].dot(cameras[i] - cloud.points[i]) < 0)
+            normals[i] = -normals[i];
+    return normals;
+}
+
+/// Metres per unit of the cloud, by how far depth cameras see: 0.1 to 30 m; what they see at 100 to 30,000 is in
+/// millimetres. 0 = neither.
+double metres_per_unit(const FoundFrames& found, const PointSet& cloud) {
+    std::vector<double> depths;
+    for (std::size_t i = 0; i < cloud.points.size(); i += 97)
+        if (found.frame[i] >= 0)
+            depths.push_back((cloud.points[i] -
+                              found.frames[static_cast<std::size_t>(found.frame[i])].world_from_camera.translation())
+                                 .norm());
+    const double middle = median(std::move(depths), 0);
+    return middle >= 0.1 && middle <= 30 ? 1 : middle > 100 && middle <= 30000 ? 0.001 : 0;
+}
+
+/// The frames as images of a recording, in metres.
+class FrameImages {
+  public:
+    FrameImages(const FoundFrames& found, std::span<const Vector3d> points, double metres)
+        : found_(found), points_(points), metres_(metres) {}
+
+    [[nodiscard]] std::size_t size() const { return found_.frames.size(); }
+    [[nodiscard]] DepthImage depth(std::size_t index) const {
+        cv::Mat1f z_m = found_.depth(index, points_);
+        z_m *= metres_;
+        return {found_.frames[index].camera, z_m, {}};
+    }
+    [[nodiscard]] Isometry3d pose(std::size_t index) const {
+        Isometry3d pose = found_.frames[index].world_from_camera;
+        pose.translation() *= metres_;
+        return pose;
+    }
+    [[nodiscard]] DepthNoise noise() const {
+        constexpr std::size_t some = 5;
+        std::vector<DepthImage> images;
+        for (const std::size_t index : spread(some, size()))
+            images.push_back(depth(index));
+        return measure_noise(images);
+    }
+    [[nodiscard]] int reach(double radius_m) const {
+        std::vector<std::optional<Isometry3d>> poses;
+        for (std::size_t i = 0; i < size(); ++i)
+            poses.emplace_back(pose(i));
+        return reach_for(poses, radius_m);
+    }
+
+  private:
+    const FoundFrames& found_;
+    std::span<const Vector3d> points_;
+    double metres_;
+};
+
+/// An estimate of visibility, and its expected error.
+struct Estimate {
+    float value, error;
+};
+
+/// By how much more than their tables say both ways err on merged clouds: rays from noisy points where wires and leaves
+/// are many (found / expected 0.9 to 1.6), images of exact depth where strides make wires solid (1.0 to 1.8).
+struct TooSure {
+    double rays, images;
+};
+TooSure too_sure(bool noisy) { return noisy ? TooSure{1.3, 1} : TooSure{1, 1.5}; }
+
+/// Whether depth has a sensor's noise; that of rounding to 0.2 mm is none.
+bool is_noisy(const DepthNoise& noise) {
+    constexpr double near_m = 2, sensor_m = 0.0005;
+    return noise.at(near_m) > sensor_m;
+}
+
+/// Points / pixels of the frames.
+double filled(const FoundFrames& found) {
+    const auto points = std::ranges::count_if(found.pixel, [](std::int32_t pixel) { return pixel >= 0; });
+    return static_cast<double>(points) / static_cast<double>(found.frames.front().camera.size.area()) /
+           static_cast<double>(found.frames.size());
+}
+
+/// The mean of both, weighted by their squared errors, which are alike to half: 0.2 to 0.65 of ten merged clouds.
+Estimate mean_of(Estimate rays, Estimate image, const TooSure& factors) {
+    constexpr double alike = 0.5, least = 0.01;
+    const double a = factors.rays * std::max<double>(rays.error, least);
+    const double b = factors.images * std::max<double>(image.error, least);
+    const double of_a = 1 / (a * a), of_b = 1 / (b * b);
+    const double value = of_a * static_cast<double>(rays.value) + of_b * static_cast<double>(image.value);
+    return {static_cast<float>(value / (of_a + of_b)),
+            static_cast<float>(std::sqrt(of_a + of_b + 2 * alike / (a * b)) / (of_a + of_b))};
+}
+
+/// What a frame says of a pixel. A flying pixel of noisy depth, which images drop, is worth the mean of those round it.
+/// Nothing where there are none, or depth is exact: rays know such pixels.
+std::optional<Estimate> estimate_at(const cv::Mat1f& visibility, const cv::Mat1f& errors, int v, int u, bool noisy) {
+    constexpr int round = 2;
+    constexpr float flying = 0.22F; // RMS of six merged clouds: 0.16 to 0.30
+    if (!std::isnan(visibility(v, u)) && !std::isnan(errors(v, u)))
+        return Estimate{visibility(v, u), errors(v, u)};
+    if (!noisy)
+        return std::nullopt;
+    float sum = 0;
+    int count = 0;
+    for (int y = std::max(0, v - round); y <= std::min(visibility.rows - 1, v + round); ++y)
+        for (int x = std::max(0, u - round); x <= std::min(visibility.cols - 1, u + round); ++x)
+            if (!std::isnan(visibility(y, x))) {
+                sum += visibility(y, x);
+                ++count;
+            }
+    return count > 0 ? std::optional(Estimate{sum / static_cast<float>(count), flying}) : std::nullopt;
+}
+
+} // namespace
+
+/// What a person decides about sides is not overruled; images know no sky.
+bool MergedCloudAo::looks_for_frames(const PointSet& cloud) const {
+    return !options_.sky && options_.outside == "auto" && options_.normals == CloudNormals::automatic &&
+           cloud.triangles.empty() && cloud.seen_from.empty() && cloud.points.size() <= rays_.most_at_once();
+}
+
+PointVisibility MergedCloudAo::compute(const PointSet& cloud, const std::optional<Vector3d>& scanner) {
+    constexpr double explained = 0.95;
+    std::optional<FoundFrames> found;
+    const Stopwatch looking;
+    if (looks_for_frames(cloud))
+        found = found_frames(cloud.points);
+    if (!found || found->share < explained)
+        return rays_.compute(cloud, scanner);
+    const double looked_ms = looking.ms();
+    const std::vector<Vector3d> cameras = cameras_of(*found), normals = turned_to(cameras, cloud);
+    PointSet seen = cloud;
+    seen.normals = normals;
+    seen.seen_from = cameras;
+    PointVisibility result = rays_.compute(seen, scanner);
+    result.timings.emplace_back("frames found", looked_ms);
+    result.notes.insert(result.notes.begin(),
+                        fmt::format("{} depth frames were found in the order of the points: {:.1f} % of these are "
+                                    "pixels of {}x{} images, whose cameras tell the sides of surfaces.",
+                                    found->frames.size(), 100 * found->share, found->frames.front().camera.size.width,
+                                    found->frames.front().camera.size.height));
+    try {
+        add_images(result, cloud, *found);
+    } catch (const Outage&) { // concerns more than this cloud
+        throw;
+    } catch (const Error& failure) {
+        result.notes.push_back(fmt::format("frames are not computed as images: {}.", failure.what()));
+    }
+    return result;
+}
+
+void MergedCloudAo::add_images(PointVisibility& result, const PointSet& cloud, const FoundFrames& found) const {
+    constexpr double least_filled = 0.4; // at 0.3, noise is not found, and images err by 1.7 times what they expect
+    const double metres = metres_per_unit(found, cloud), radius_m = result.radius * metres;
+    if (metres == 0)
+        throw Error("their depth is neither in metres nor in millimetres");
+    if (const double share = filled(found); share < least_filled)
+        throw Error(fmt::format("only {:.0f} % of their pixels hold points, too few to tell depth noise", 100 * share));
+    const Stopwatch stopwatch;
+    const MethodRow& method = method_named("surfel");
+    const std::unique_ptr<MethodSetup> setup = method.setup();
+    set(*row_named(setup->parameters(), "radius"), radius_m);
+    FrameAo frame_ao(images_.device(), method, *setup, images_.preparation);
+    const FrameImages images(found, cloud.points, metres);
+    const DepthNoise noise = images.noise();
+    const bool noisy = is_noisy(noise);
+    const TooSure factors = too_sure(noisy);
+    SequenceAo sequence = frame_ao.sequence(radius_m, noise, {.reach = images.reach(radius_m)});
+    std::size_t added = 0, values = 0;
+    for (std::size_t i = 0; i < images.size(); ++i) {
+        for (; added < std::min(images.size(), i + sequence.reach() + 1); ++added)
+            sequence.add(added, images.depth(added), images.pose(added));
+        sequence.forget_before(i - std::min(i, sequence.reach()));
+        const SequenceAoResult made = sequence.compute(i);
+        const cv::Mat1f errors = expected_error_of(images.depth(i), made.ao.visibility, radius_m, noise,
+                                                   frame_ao.errors(noise, share_of_gain(made.others())));
+        const FoundFrame& frame = found.frames[i];
+        for (std::size_t k = frame.first; k < frame.last; ++k) {
+            if (found.frame[k] != static_cast<std::int32_t>(i))
+                continue;
+            const int v = found.pixel[k] / frame.camera.size.width, u = found.pixel[k] % frame.camera.size.width;
+            const std::optional<Estimate> image = estimate_at(made.ao.visibility, errors, v, u, noisy);
+            if (!image)
+                continue;
+            const bool flies = std::isnan(made.ao.visibility(v, u)) || std::isnan(result.visibility[k]);
+            const Estimate best = flies ? *image : mean_of({result.visibility[k], result.error[k]}, *image, factors);
+            result.visibility[k] = best.value;
+            result.error[k] = best.error;
+            ++values;
+        }
+    }
+    if (result.expected_error)
+        std::erase(result.notes, told_error(*result.expected_error, 0).note);
+    double squares = 0, known = 0;
+    for (const float error : result.error)
+        if (!std::isnan(error)) {
+            squares += static_cast<double>(error) * static_cast<double>(error);
+            known += 1;
+        }
+    if (known > 0)
+        result.expected_error = std::sqrt(squares / known);
+    result.notes.push_back(
+        fmt::format("the frames are computed as images, too, with each other's help: {:.1f} % of the "
+                    "values are means of both. Depth noise: {}.",
+                    100 * static_cast<double>(values) / static_cast<double>(cloud.points.size()), describe(noise)));
+    if (result.expected_error)
+        result.notes.push_back(told_error(*result.expected_error, 0).note);
+    result.timings.emplace_back("frames as images", stopwatch.ms());
+}
+
+} // namespace scanshade

@@ -1,0 +1,155 @@
+// Clouds merged from depth frames: found frames are computed as images, and every point gets the mean of both ways.
+#include "ao/cloud/cloud_ao.h"
+#include "ao/merged_cloud.h"
+#include "apps/scenes/generate.h"
+#include "apps/scenes/places/scenes.h"
+#include "apps/scenes/sensor.h"
+#include "projection/base/error.h"
+#include "projection/base/hash.h"
+#include "tests/support/watched.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <gtest/gtest.h>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+
+constexpr double radius_m = 0.5;
+const Pinhole camera{175, 175, 106.5, 79.8, {214, 160}};
+
+struct Merged {
+    std::vector<Vector3d> points;
+    std::vector<float> truth;
+};
+
+/// So many frames of a scene's walk in world coordinates, as single-precision files have them, with true visibility.
+Merged merged(const char* name, const char* sensor, int frames) {
+    const scene::World world(scene::scene_named(name));
+    Merged all;
+    for (int frame = 0; frame < frames; ++frame) {
+        const Isometry3d pose = scene::world_from_camera(world.scene().walk, 2 + 0.5 * frame);
+        const Sight sight{world, camera, pose, render_geometry(world, camera, pose), 1, frame};
+        const cv::Mat1f z = sensor_named(sensor).record(sight);
+        const cv::Mat1f truth = scene::true_visibility(world, camera, pose, {radius_m, 64, 1, false}).visibility[0];
+        for (int v = 0; v < z.rows; ++v)
+            for (int u = 0; u < z.cols; ++u)
+                if (z(v, u) > 0) {
+                    const Vector3d point = pose * camera.point(u, v, static_cast<double>(z(v, u)));
+                    all.points.push_back(point.cast<float>().cast<double>());
+                    all.truth.push_back(truth(v, u));
+                }
+    }
+    return all;
+}
+
+double rmse(const std::vector<float>& found, const std::vector<float>& truth) {
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < found.size(); ++i)
+        if (!std::isnan(found[i]) && !std::isnan(truth[i])) {
+            sum += std::pow(static_cast<double>(found[i]) - static_cast<double>(truth[i]), 2);
+            ++count;
+        }
+    return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(count, 1)));
+}
+
+bool any_note(const PointVisibility& found, const std::string& words) {
+    return std::ranges::any_of(found.notes,
+                               [&](const std::string& note) { return note.find(words) != std::string::npos; });
+}
+
+MergedImages on_device() {
+    return {[]() -> gpu::Device& { return tests::watched_device(); }};
+}
+
+PointVisibility computed(const std::vector<Vector3d>& points, const CloudAoOptions& options = {.radius = radius_m},
+                         const MergedImages& images = on_device()) {
+    return MergedCloudAo(options, nullptr, images).compute({points});
+}
+
+TEST(MergedCloud, noisy_frames_err_less_than_by_rays_and_say_how_much) {
+    for (const auto& [scene, sensor] : {std::pair("kitchen", "kinect"), std::pair("office", "tof")}) {
+        const Merged cloud = merged(scene, sensor, 6);
+        const PointVisibility together = computed(cloud.points),
+                              rays = CloudAo({.radius = radius_m}).compute({cloud.points});
+        EXPECT_TRUE(any_note(together, "6 depth frames were found"));
+        EXPECT_TRUE(any_note(together, "computed as images, too"));
+        const double error = rmse(together.visibility, cloud.truth), by_rays = rmse(rays.visibility, cloud.truth);
+        std::printf("%s: %.3f, expected %.3f; by rays %.3f\n", sensor, error, *together.expected_error, by_rays);
+        EXPECT_LT(error, 0.15) << sensor;
+        EXPECT_LT(error, 0.8 * by_rays) << sensor;
+        EXPECT_GT(*together.expected_error, 0.75 * error) << sensor;
+        EXPECT_LT(*together.expected_error, 1.33 * error) << sensor;
+    }
+}
+
+TEST(MergedCloud, recorded_sides_are_not_asked_where_cameras_are_known) {
+    const Merged cloud = merged("office", "ideal", 4);
+    std::vector<Vector3d> wrong(cloud.points.size()), none;
+    const PointVisibility right = computed(cloud.points);
+    for (std::size_t i = 0; i < wrong.size(); ++i) {
+        wrong[i] = right.normals[i].cast<double>();
+        if (hash(static_cast<std::uint32_t>(i)) % 2 == 0)
+            wrong[i] = -wrong[i];
+    }
+    const PointVisibility turned =
+        MergedCloudAo({.radius = radius_m}, nullptr, on_device()).compute({cloud.points, wrong});
+    EXPECT_LT(rmse(turned.visibility, right.visibility), 0.02);
+}
+
+TEST(MergedCloud, without_a_device_cameras_tell_sides) {
+    const Merged cloud = merged("office", "ideal", 3);
+    const PointVisibility found =
+        computed(cloud.points, {.radius = radius_m}, {[]() -> gpu::Device& { throw Error("no Vulkan device"); }});
+    EXPECT_TRUE(any_note(found, "3 depth frames were found"));
+    EXPECT_TRUE(any_note(found, "not computed as images: no Vulkan device"));
+    EXPECT_TRUE(any_note(found, "turned to the cameras that saw them"));
+    EXPECT_LT(rmse(found.visibility, cloud.truth), 0.12);
+}
+
+TEST(MergedCloud, other_clouds_and_wishes_are_rays_as_ever) {
+    const Merged cloud = merged("office", "kinect", 2);
+    std::vector<Vector3d> shuffled = cloud.points;
+    for (std::size_t i = shuffled.size() - 1; i > 0; --i)
+        std::swap(shuffled[i], shuffled[hash(static_cast<std::uint32_t>(i)) % (i + 1)]);
+    const auto expect_rays = [](const std::vector<Vector3d>& points, const CloudAoOptions& options) {
+        const PointVisibility found = computed(points, options);
+        EXPECT_FALSE(any_note(found, "depth frames were found"));
+        const std::vector<float> rays = CloudAo(options).compute({points}).visibility;
+        ASSERT_EQ(found.visibility.size(), rays.size());
+        EXPECT_EQ(rmse(found.visibility, rays), 0);
+    };
+    expect_rays(shuffled, {.radius = radius_m});
+    expect_rays(cloud.points, {.radius = radius_m, .outside = "0,0,1"});
+    expect_rays(cloud.points, {.sky = true});
+}
+
+TEST(MergedCloud, images_that_are_mostly_holes_tell_sides_and_no_more) {
+    const Merged cloud = merged("office", "kinect", 2);
+    std::vector<Vector3d> part;
+    for (std::size_t i = 0; i < cloud.points.size(); ++i)
+        if (hash(static_cast<std::uint32_t>(i)) < 0.3 * 0x1p32)
+            part.push_back(cloud.points[i]);
+    const PointVisibility found = computed(part);
+    EXPECT_TRUE(any_note(found, "2 depth frames were found"));
+    EXPECT_TRUE(any_note(found, "of their pixels hold points"));
+    EXPECT_TRUE(any_note(found, "turned to the cameras that saw them"));
+}
+
+TEST(MergedCloud, millimetres_are_seen_as_metres) {
+    const Merged cloud = merged("office", "tof", 3);
+    std::vector<Vector3d> in_mm = cloud.points;
+    for (Vector3d& point : in_mm)
+        point *= 1000;
+    const PointVisibility metres = computed(cloud.points), millimetres = computed(in_mm, {.radius = 1000 * radius_m});
+    EXPECT_TRUE(any_note(millimetres, "computed as images, too"));
+    EXPECT_NEAR(rmse(millimetres.visibility, cloud.truth), rmse(metres.visibility, cloud.truth), 0.01);
+}
+
+} // namespace
+} // namespace scanshade
