@@ -2,6 +2,7 @@
 #include "ao/cloud/sides/sides.h"
 
 #include "ao/cloud/cloud_ao.h"
+#include "ao/cloud/sides/noise_camera.h"
 #include "ao/cloud/sides/patches.h"
 #include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scanner.h"
@@ -10,7 +11,9 @@
 #include "tests/support/files.h"
 #include "tests/support/points.h"
 
+#include <functional>
 #include <gtest/gtest.h>
+#include <limits>
 
 namespace scanshade {
 namespace {
@@ -388,6 +391,43 @@ TEST(Sides, a_ball_whose_normals_look_in_is_doubted) {
     }
     EXPECT_EQ(doubts_of_sides(visibility(ball, outward)), "");
     EXPECT_NE(doubts_of_sides(visibility(ball, inward)), "");
+}
+
+/// A room of 4 x 3 x 2.5 m with a table, seen from one place by rays of even angles.
+Points seen_in_room(const Vector3d& camera) {
+    Dice dice(4);
+    Points points;
+    for (int i = 0; i < 60000; ++i) {
+        const Vector3d along = Vector3d(dice.gauss(), dice.gauss(), dice.gauss()).normalized();
+        double far = std::numeric_limits<double>::infinity();
+        for (int axis = 0; axis < 3; ++axis)
+            far = std::min(far, ((along[axis] > 0 ? Vector3d(4, 3, 2.5)[axis] : 0) - camera[axis]) / along[axis]);
+        const double table = (0.7 - camera.z()) / along.z();
+        if (const Vector3d at = camera + table * along; table > 0 && (at - Vector3d(2.5, 1.5, 0.7)).norm() < 0.7)
+            far = std::min(far, table);
+        points.push_back(camera + far * along);
+    }
+    return points;
+}
+
+TEST(NoiseCamera, stands_where_noise_grows_from) {
+    const Vector3d camera(1.2, 0.9, 1.5);
+    CloudSurface surface = cloud_surface(LocalCloud(seen_in_room(camera)), {});
+    const DiscRays rays(surface);
+    const auto found = [&](const std::function<double(const Vector3d& point)>& sigma) {
+        surface.noise.clear();
+        for (std::size_t i = 0; i < surface.size(); ++i)
+            surface.noise.push_back(static_cast<float>(sigma(surface.middle + surface.tree[i].cast<double>())));
+        return camera_of_noise(surface, rays);
+    };
+    const auto told = found([&](const Vector3d& point) { return 0.002 + 0.002 * (point - camera).squaredNorm(); });
+    ASSERT_TRUE(told);
+    EXPECT_LT((surface.middle + told->position.cast<double>() - camera).norm(), 0.4);
+    EXPECT_GT(told->seen, 0.9);
+    EXPECT_GT(told->noise, 0.9);
+    EXPECT_GT(told->density, 0.5);
+    Dice dice(6);
+    EXPECT_FALSE(found([&](const Vector3d&) { return 0.01 + 0.01 * dice.roll(); })) << "no distance tells of it";
 }
 
 TEST(Sides, half_of_the_boxes_turned_over_are_no_majority) {
