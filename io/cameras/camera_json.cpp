@@ -253,16 +253,15 @@ void take_depth_scale(const fs::path& file, const Json& object, CameraFile& resu
             result.warnings.push_back(fmt::format("{}: \"{}\" {:g} was taken as {}: {:g} units per metre.",
                                                   file.string(), key, scale, meaning, units));
         };
-        if (key == units_per_metre && scale > 0 && !result.depth_units_per_metre)
-            take(scale, "units per metre");
-        else if (result.depth_units_per_metre || !(scale > 0) || (scale > 10 && scale < 100))
+        const bool known = key == units_per_metre;
+        if (result.depth_units_per_metre || !(scale > 0) || (!known && scale > 10 && scale < 100))
             result.warnings.push_back(fmt::format("{}: \"{}\" {:g} is not used.", file.string(), key, scale));
+        else if (known || scale >= 100)
+            take(scale, "units per metre");
         else if (scale <= 0.01)
             take(1 / scale, "metres per unit");
-        else if (scale <= 10)
-            take(1000 / scale, "millimetres per unit, as in BOP");
         else
-            take(scale, "units per metre");
+            take(1000 / scale, "millimetres per unit, as in BOP");
     }
 }
 

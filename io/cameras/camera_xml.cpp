@@ -81,8 +81,11 @@ CameraFile camera_from_xml(const fs::path& file, const std::string& text) {
         return camera_from_yaml(file, as_yaml(storage));
     const pugi::xml_node depth = document.child("depth"), rgb = document.child("rgb");
     if (!depth)
-        refuse_camera(file, fmt::format("XML of <{}>: expected OpenCV's <opencv_storage>, or PCL's <rgb> and <depth>",
-                                        document.document_element().name()));
+        refuse_camera(
+            file,
+            fmt::format(
+                "\"depth\" is missing in XML of <{}>: expected OpenCV's <opencv_storage>, or PCL's <rgb> and <depth>",
+                document.document_element().name()));
     CameraFile result;
     result.camera.pinhole = pinhole_of(file, depth);
     const char* const unit = "z_multiplication_factor";
