@@ -1,6 +1,7 @@
 // Clouds that were merged from depth frames.
 #include "ao/merged_cloud.h"
 
+#include "ao/cloud/cloud_error.h"
 #include "ao/cloud/cloud_notes.h"
 #include "ao/frame.h"
 #include "projection/base/error.h"
@@ -225,14 +226,10 @@ void MergedCloudAo::add_images(PointVisibility& result, const PointSet& cloud, c
     }
     if (result.expected_error)
         std::erase(result.notes, told_error(*result.expected_error, 0).note);
-    double squares = 0, known = 0;
+    ErrorSum errors;
     for (const float error : result.error)
-        if (!std::isnan(error)) {
-            squares += static_cast<double>(error) * static_cast<double>(error);
-            known += 1;
-        }
-    if (known > 0)
-        result.expected_error = std::sqrt(squares / known);
+        errors.add(error);
+    result.expected_error = errors.rms();
     result.notes.push_back(
         fmt::format("the frames are computed as images, too, with each other's help: {:.1f} % of the "
                     "values are means of both. Depth noise: {}.",

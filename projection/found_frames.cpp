@@ -595,12 +595,38 @@ std::vector<Found> all_frames(Points points, double grain) {
     return found;
 }
 
-/// By a few places, so that other clouds cost next to nothing.
-bool has_frames(Points points, double grain) {
+constexpr std::size_t fewest_of_frame = 1000; ///< points that are looked at
+
+/// The points of a range that are finite.
+struct FinitePoints {
+    std::vector<std::uint32_t> numbers;
+    std::vector<Vector3d> points; ///< relative to `middle`, since map coordinates are large
+    Vector3d middle = Vector3d::Zero();
+    double grain = 0;
+
+    FinitePoints(Points all, const Range& range) {
+        for (std::size_t i = range.first; i < range.last; ++i)
+            if (all[i].allFinite() && !all[i].isZero()) {
+                numbers.push_back(static_cast<std::uint32_t>(i));
+                points.push_back(all[i]);
+            }
+        if (!are_enough())
+            return;
+        grain = grain_of(points);
+        middle = points[points.size() / 2];
+        for (Vector3d& point : points)
+            point -= middle;
+    }
+    [[nodiscard]] bool are_enough() const { return points.size() >= fewest_of_frame; }
+};
+
+/// By a few places, before anything looks at all points: other clouds, however large, cost next to nothing.
+bool has_frames(Points points) {
     constexpr std::size_t window = 40000, places = 4;
     for (std::size_t place = 0; place < places; ++place) {
         const std::size_t first = (points.size() - std::min(points.size(), window)) / (places - 1) * place;
-        if (frame_in(points, {first, std::min(points.size(), first + window)}, first, grain))
+        const FinitePoints some(points, {first, std::min(points.size(), first + window)});
+        if (some.are_enough() && frame_in(some.points, {0, some.points.size()}, 0, some.grain))
             return true;
         if (points.size() <= window)
             break;
@@ -685,23 +711,12 @@ cv::Mat1f FoundFrames::depth(std::size_t index, Points points) const {
 }
 
 std::optional<FoundFrames> found_frames(Points points) {
-    constexpr std::size_t fewest = 1000, most_pixels = 50; // per point: images that are nearly all holes are none
-    std::vector<std::uint32_t> numbers;
-    std::vector<Vector3d> finite;
-    for (std::size_t i = 0; i < points.size(); ++i)
-        if (points[i].allFinite() && !points[i].isZero()) {
-            numbers.push_back(static_cast<std::uint32_t>(i));
-            finite.push_back(points[i]);
-        }
-    if (finite.size() < fewest)
+    constexpr std::size_t most_pixels = 50; // per point: images that are nearly all holes are none
+    if (!has_frames(points))
         return std::nullopt;
-    const double grain = grain_of(finite);
-    const Vector3d middle = finite[finite.size() / 2]; // map coordinates are large
-    for (Vector3d& point : finite)
-        point -= middle;
-    if (!has_frames(finite, grain))
-        return std::nullopt;
-    std::vector<Found> found = all_frames(finite, grain);
+    const FinitePoints all(points, {0, points.size()});
+    const std::vector<Vector3d>& finite = all.points;
+    std::vector<Found> found = all_frames(finite, all.grain);
     if (found.empty())
         return std::nullopt;
     const Grid grid = common_grid(found, finite);
@@ -717,11 +732,11 @@ std::optional<FoundFrames> found_frames(Points points) {
         const Range& range = found[i].range;
         FoundFrame made{{view.fx, view.fy, view.cx - grid.left, view.cy - grid.top, size},
                         view.world_from_camera,
-                        numbers[range.first],
-                        numbers[range.last - 1] + std::size_t(1)};
-        made.world_from_camera.translation() += middle;
+                        all.numbers[range.first],
+                        all.numbers[range.last - 1] + std::size_t(1)};
+        made.world_from_camera.translation() += all.middle;
         result.frames.push_back(made);
-        take_pixels(result, found[i], i, finite, grid, numbers);
+        take_pixels(result, found[i], i, finite, grid, all.numbers);
     }
     const auto on_pixels = std::ranges::count_if(result.pixel, [](std::int32_t pixel) { return pixel >= 0; });
     result.share = static_cast<double>(on_pixels) / static_cast<double>(finite.size());

@@ -22,6 +22,8 @@ INLINE float slope(const float* z, const Sample& sample) {
     return (z[sample.a] - *z) * sample.weight_a + (z[sample.b] - *z) * sample.weight_b;
 }
 
+INLINE float slope(const float* z, const Offset& offset) { return (z[offset.at] - *z) * offset.scale; }
+
 template <bool both>
 INLINE void raise(float slope, float& high, float& low) {
     high = larger(slope, high);
@@ -29,17 +31,17 @@ INLINE void raise(float slope, float& high, float& low) {
         low = smaller(slope, low);
 }
 
-/// So many samples in one pass over the row.
-template <int at_once, bool both>
-INLINE void raise(const Cells& cells, const Sample* samples, Horizons& __restrict found) {
+/// So many samples or offsets in one pass over the row.
+template <int at_once, bool both, class Step>
+INLINE void raise(const Cells& cells, const Step* steps, Horizons& __restrict found) {
     const float* __restrict z = cells.z;
-    std::array<Sample, at_once> taken;
+    std::array<Step, at_once> taken;
     for (int i = 0; i < at_once; ++i)
-        taken[static_cast<std::size_t>(i)] = samples[i];
+        taken[static_cast<std::size_t>(i)] = steps[i];
     for (int x = 0, count = cells.count; x < count; ++x) {
         float high = found.high[x], low = found.low[x];
-        for (const Sample& sample : taken)
-            raise<both>(slope(z + x, sample), high, low);
+        for (const Step& step : taken)
+            raise<both>(slope(z + x, step), high, low);
         found.high[x] = high;
         if constexpr (both)
             found.low[x] = low;
@@ -176,27 +178,13 @@ INLINE void look_in_ball(const Cells& cells, const Ray& ray, float radius, Horiz
     }
 }
 
-template <int at_once>
-INLINE void look_at(const Cells& cells, const Offset* offsets, Horizons& __restrict found) {
-    const float* __restrict z = cells.z;
-    std::array<Offset, at_once> taken;
-    for (int i = 0; i < at_once; ++i)
-        taken[static_cast<std::size_t>(i)] = offsets[i];
-    for (int x = 0, count = cells.count; x < count; ++x) {
-        float high = found.high[x], low = found.low[x];
-        for (const Offset& offset : taken)
-            raise<true>((z[x + offset.at] - z[x]) * offset.scale, high, low);
-        found.high[x] = high, found.low[x] = low;
-    }
-}
-
 INLINE void look_at(const Cells& cells, std::span<const Offset> offsets, Horizons& found) {
     start(found, cells.count);
     std::size_t i = 0;
     for (; i + 4 <= offsets.size(); i += 4)
-        look_at<4>(cells, &offsets[i], found);
+        raise<4, true>(cells, &offsets[i], found);
     for (; i < offsets.size(); ++i)
-        look_at<1>(cells, &offsets[i], found);
+        raise<1, true>(cells, &offsets[i], found);
 }
 
 /// Within 1e-7: interpolated at Chebyshev's nodes, after reduction to |tan| <= tan(pi / 8).
