@@ -77,7 +77,7 @@ std::vector<std::size_t> row_ends(Points points) {
 }
 
 /// The rows whose planes are known: flat to the grain, and wide enough across. Walls without noise are lines, which
-/// tell nothing; two rows in one are no plane.
+/// leave the plane open; two rows in one are no plane.
 std::vector<Row> rows_of(Points points, double grain) {
     constexpr std::size_t fewest = 12;
     constexpr double widest = 25;

@@ -1,9 +1,21 @@
 #include "ao/cloud/back_share.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tbb/parallel_for.h>
 
 namespace scanshade {
+
+namespace {
+
+/// Its square is the share's without bias: that of the counted share is larger by what chance adds, which matters where
+/// few rays meet backs.
+float root_of_square(int back, int cast) {
+    const auto hits = static_cast<float>(back), all = static_cast<float>(cast);
+    return back > 1 ? std::sqrt(hits * (hits - 1) / (all * (all - 1))) : 0.0F;
+}
+
+} // namespace
 
 BackShare back_share(const CloudSurface& surface, const DiscRays& rays, float radius, std::size_t most_leaves) {
     constexpr std::size_t runs = 3;      // of eight rays
@@ -43,8 +55,7 @@ BackShare back_share(const CloudSurface& surface, const DiscRays& rays, float ra
         all.back += some.back;
         const std::size_t begin = surface.tree.leaf_range(first).first, end = surface.tree.leaf_range(last - 1).second;
         std::fill(found.near.begin() + static_cast<std::ptrdiff_t>(begin),
-                  found.near.begin() + static_cast<std::ptrdiff_t>(end),
-                  some.cast > 0 ? static_cast<float>(some.back) / static_cast<float>(some.cast) : 0.0F);
+                  found.near.begin() + static_cast<std::ptrdiff_t>(end), root_of_square(some.back, some.cast));
     }
     found.mean = all.cast > 0 ? static_cast<double>(all.back) / all.cast : 0;
     return found;

@@ -12,7 +12,7 @@ namespace scanshade {
 /// Cosine-weighted rays that leave the front of a surface meet fronts or nothing, but behind sheets that were seen from
 /// one side only. What noise has left of a surface is layers, whose backs they meet.
 struct BackShare {
-    /// By index in the tree: of rays near by, the share that meets a back within the radius.
+    /// By index in the tree: of rays near by, the share that meets a back within the radius, whose square is unbiased.
     std::vector<float> near;
     double mean = 0; ///< of all rays
 };

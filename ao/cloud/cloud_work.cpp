@@ -374,14 +374,8 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
         if (!rays)
             rays.emplace(surface);
         backs = fitted.empty() ? back_share(surface, *rays, reach(), some) : back_share(surface, *rays, reach());
-        // Noise far below the spacing leaves no layers: those backs are sheets that were seen from one side.
-        constexpr double to_layer = 0.3; // of the spacing
-        const auto layered =
-            static_cast<float>(std::min(static_cast<double>(fitted.noise) / (to_layer * result_.spacing), 1.0));
         if (fitted.empty())
             backs.near.clear();
-        for (float& share : backs.near)
-            share *= layered;
         fitted_.backs = std::max(fitted_.backs, backs.mean);
         watch_.lap("backs");
     }
