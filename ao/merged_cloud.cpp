@@ -126,8 +126,8 @@ Estimate mean_of(Estimate rays, Estimate image, const TooSure& factors) {
             static_cast<float>(std::sqrt(of_a + of_b + 2 * alike / (a * b)) / (of_a + of_b))};
 }
 
-/// What a frame says of a pixel. A flying pixel of noisy depth, which images drop, is worth the mean of those around it.
-/// Nothing where there are none, or depth is exact: rays know such pixels.
+/// What a frame says of a pixel. A flying pixel of noisy depth, which images drop, is worth the mean of those around
+/// it. Nothing where there are none, or depth is exact: rays know such pixels.
 std::optional<Estimate> estimate_at(const cv::Mat1f& visibility, const cv::Mat1f& errors, int v, int u, bool noisy) {
     constexpr int round = 2;
     constexpr float flying = 0.22F; // RMS of six merged clouds: 0.16 to 0.30
