@@ -203,6 +203,11 @@ def places_together(rows):
     return {name: (squares / n) ** 0.5 if n else None for name, (n, squares) in sums.items()}
 
 
+def in_readme(name):
+    """One quality is enough to compare methods; --json and the page have them all."""
+    return not re.search(r"\b(lowest|low|medium|highest)\b", name)
+
+
 def markdown(result):
     sensors = [s for s in SENSORS if any(row["sensor"] == s for row in result["rows"])]
     places = list(result["rows"][0]["place"])
@@ -210,6 +215,8 @@ def markdown(result):
     heads = ["method and quality", *sensors, "bias", "SSIM", *places, *(f"ms, {short_name(d)}" for d in devices)]
     lines = ["| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
     for (method, name), rows in by_configuration(result).items():
+        if not in_readme(name):
+            continue
         errors = [f"{cell(rows[s]['rms'], 3)}, {cell(rows[s]['held_out_rms'], 3)}" if s in rows else "" for s in sensors]
         together = places_together(rows.values())
         first = rows[sensors[0]] if sensors[0] in rows else next(iter(rows.values()))
