@@ -1,6 +1,7 @@
 // Captures with known truth: frames along the scene's walk, rendered, recorded, written.
 #include "apps/scenes/generate.h"
 
+#include "apps/scenes/merged_frames.h"
 #include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scene_cloud.h"
 #include "apps/scenes/sensor.h"
@@ -289,10 +290,22 @@ std::vector<std::string> names_of(const std::vector<Row>& table) {
     return names;
 }
 
+scene::SceneCloud cloud_from(const GenerateOptions& options, const scene::World& world) {
+    const auto points = static_cast<std::size_t>(options.cloud);
+    const scene::ScannerOptions& scanner = options.scanner;
+    if (options.cloud_frames == 0)
+        return scene::scanned_cloud(world, points, scanner, options.seed);
+    if (scanner.stations > 0 || scanner.noise_m > 0 || scanner.noise_per_m > 0 || scanner.beam_rad > 0)
+        throw Misuse("cloud-frames: these are depth frames of --sensor, so stations, noise and beam cannot be given");
+    return merged_frames(world, points,
+                         {options.cloud_frames, options.first, options.step, options.sensor, scanner.misaligned_m,
+                          options.cloud_shuffled},
+                         options.seed);
+}
+
 /// The cloud as a file of floats, and once more with the truth.
 void write_scene_cloud(const GenerateOptions& options, const scene::World& world, const fs::path& out) {
-    const scene::SceneCloud cloud =
-        scene::scanned_cloud(world, static_cast<std::size_t>(options.cloud), options.scanner, options.seed);
+    const scene::SceneCloud cloud = cloud_from(options, world);
     std::array<std::vector<float>, 3> normals;
     std::vector<AddedField> fields;
     constexpr std::array names{"nx", "ny", "nz"};
@@ -407,6 +420,12 @@ std::vector<Parameter> GenerateOptions::parameters() {
          .low = 0,
          .high = 200000000},
         {.name = "cloud-normals", .help = "writes the cloud's normals", .value = &cloud_normals},
+        {.name = "cloud-frames",
+         .help = "the cloud is so many depth frames of --sensor, --first and --step, merged; 0 = none",
+         .value = &cloud_frames,
+         .low = 0,
+         .high = 100000},
+        {.name = "cloud-shuffled", .help = "points of merged frames lose their order", .value = &cloud_shuffled},
         {.name = "overwrite", .help = "replaces an earlier generated capture", .value = &overwrite},
     };
     for (Parameter& row : scanner.parameters()) {

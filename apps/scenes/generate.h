@@ -35,6 +35,8 @@ struct GenerateOptions {
     bool light_occluded = true;                    ///< ambient light is multiplied by true visibility
     int cloud = 0;                                 ///< points; 0 = a recording
     bool cloud_normals = true;                     ///< whether the cloud has them
+    int cloud_frames = 0;                          ///< so many frames of the sensor merged are the cloud; 0 = scanned
+    bool cloud_shuffled = false;                   ///< whether merged frames' points lose their order
     scene::ScannerOptions scanner = {};            ///< of the cloud
     bool overwrite = false;
 
@@ -58,7 +60,7 @@ using GenerateProgress = std::function<void(int done, int total)>;
 /// - with a light whose parts are known: truth/ambient, truth/direct and truth/albedo/<stamp>.tiff, linear red, green,
 ///   blue; a colour image is then taken from where the depth image is, and is ambient * visibility + direct
 /// - with `cloud` set, in place of images: NAME.ply, points of equal density on all that can be seen of the scene, or
-///   what the scanner records; and truth/NAME.ply, the same with the field ambient_occlusion
+///   what the scanner records, or merged depth frames; and truth/NAME.ply, the same with the field ambient_occlusion
 /// Same options, same bytes, however many threads there are. A frame is the same whatever first and step lead to it.
 /// Throws Misuse for options out of range, and for an `out` that holds something and is not to be overwritten. Also,
 /// even then, for one that is no generated capture. Throws Error where a file cannot be written.

@@ -123,7 +123,7 @@ std::vector<Parameter> ScannerOptions::parameters() {
          .low = 0,
          .high = 0.1},
         {.name = "misaligned",
-         .help = "sigma of the stations' shifts along each axis",
+         .help = "sigma of the stations' or frames' shifts along each axis",
          .value = &misaligned_m,
          .unit = "m",
          .low = 0,

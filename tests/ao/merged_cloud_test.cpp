@@ -6,6 +6,7 @@
 #include "apps/scenes/sensor.h"
 #include "projection/base/error.h"
 #include "projection/base/hash.h"
+#include "projection/sensor/noise.h"
 #include "tests/support/watched.h"
 
 #include <algorithm>
@@ -25,16 +26,22 @@ const Pinhole camera{175, 175, 106.5, 79.8, {214, 160}};
 struct Merged {
     std::vector<Vector3d> points;
     std::vector<float> truth;
+    std::vector<DepthImage> recorded;
 };
 
 /// So many frames of a scene's walk in world coordinates, as single-precision files have them, with true visibility.
-Merged merged(const char* name, const char* sensor, int frames) {
+/// Depth is recorded in whole numbers of a unit, or as it is (0).
+Merged merged(const char* name, const char* sensor, int frames, double units_per_metre = 0) {
     const scene::World world(scene::scene_named(name));
     Merged all;
     for (int frame = 0; frame < frames; ++frame) {
         const Isometry3d pose = scene::world_from_camera(world.scene().walk, 2 + 0.5 * frame);
         const Sight sight{world, camera, pose, render_geometry(world, camera, pose), 1, frame};
-        const cv::Mat1f z = sensor_named(sensor).record(sight);
+        cv::Mat1f z = sensor_named(sensor).record(sight);
+        for (float& depth : z)
+            if (units_per_metre > 0)
+                depth = static_cast<float>(std::round(units_per_metre * static_cast<double>(depth)) / units_per_metre);
+        all.recorded.push_back({camera, z, {}});
         const cv::Mat1f truth = scene::true_visibility(world, camera, pose, {radius_m, 64, 1, false}).visibility[0];
         for (int v = 0; v < z.rows; ++v)
             for (int u = 0; u < z.cols; ++u)
@@ -85,6 +92,15 @@ TEST(MergedCloud, noisy_frames_err_less_than_by_rays_and_say_how_much) {
         EXPECT_LT(error, 0.95 * by_rays) << sensor;
         EXPECT_GT(*together.expected_error, 0.75 * error) << sensor;
         EXPECT_LT(*together.expected_error, 1.33 * error) << sensor;
+    }
+}
+
+TEST(MergedCloud, depth_in_whole_units_has_the_noise_of_its_recording) {
+    for (const double units : {1000, 5000}) {
+        const Merged cloud = merged("kitchen", "kinect", 3, units);
+        const std::string noise = describe(measure_noise(cloud.recorded)), steps = noise.substr(noise.find("steps"));
+        EXPECT_NE(steps.find("z^2"), std::string::npos) << noise;
+        EXPECT_TRUE(any_note(computed(cloud.points), steps)) << noise;
     }
 }
 

@@ -1,8 +1,10 @@
 // Clouds, real and generated, each perturbed in every way of a table: where is the result wrong without a word?
-#include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/extent.h"
+#include "ao/gpu/device.h"
+#include "ao/merged_cloud.h"
 #include "apps/doubts/doubts.h"
 #include "apps/frame/point_clouds.h"
+#include "apps/scenes/merged_frames.h"
 #include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scanner.h"
 #include "io/captures/capture.h"
@@ -26,7 +28,7 @@ namespace fs = std::filesystem;
 using Eigen::Vector3d, Eigen::Vector3f;
 
 constexpr std::size_t most_points = 150000; ///< of real clouds; larger ones are thinned
-constexpr std::size_t generated_points = 100000;
+constexpr std::size_t generated_points = 100000, merged_points = 200000;
 constexpr double largest_rms = 0.1, largest_share = 0.1; ///< beyond which a result is wrong
 constexpr double hardly_any_rms = 0.03;                  ///< sides, or errors, that change so little do not matter
 constexpr double stated_enough = 1.33;                   ///< of the stated error: an error found up to that was told
@@ -42,7 +44,12 @@ struct Result {
 Result result_of(const TestCloud& test, double radius) {
     const Stopwatch stopwatch;
     Result result;
-    result.found = CloudAo({.radius = radius}).compute({test.points, test.normals, {}, test.z_up}, test.scanner);
+    const MergedImages images{[]() -> gpu::Device& {
+        static gpu::Device device;
+        return device;
+    }};
+    result.found = MergedCloudAo({.radius = radius}, nullptr, images)
+                       .compute({test.points, test.normals, {}, test.z_up}, test.scanner);
     result.seconds = stopwatch.ms() / 1000;
     Frame frame;
     frame.cloud = Cloud{{static_cast<int>(test.points.size()), 1}, test.points, {}, test.records};
@@ -200,19 +207,35 @@ class Gauntlet {
     std::size_t rows_ = 0;
 };
 
-void run_generated(Gauntlet& gauntlet) {
+void run_generated(Gauntlet& gauntlet, const std::string& name, const char* scene,
+                   const std::function<scene::SceneCloud(const scene::World&)>& make) {
+    if (!gauntlet.wants(name))
+        return;
+    const scene::World world(scene::scene_named(scene));
+    const scene::SceneCloud made = make(world);
+    gauntlet.run({.name = name, .points = made.points, .normals = made.normals}, [&](double radius) {
+        return Reference{scene::true_visibility(world, made, {.radius_m = radius, .rays = 256}, 4), made.normals};
+    });
+}
+
+void run_scanned(Gauntlet& gauntlet) {
     for (const char* scene : {"office", "thin", "staircase", "outdoor"})
-        for (const int stations : {0, 6}) {
-            const std::string name = fmt::format("{}, {}", scene, stations ? "6 stations" : "even");
-            if (!gauntlet.wants(name))
-                continue;
-            const scene::World world(scene::scene_named(scene));
-            const scene::SceneCloud made = scene::scanned_cloud(world, generated_points, {.stations = stations});
-            gauntlet.run({.name = name, .points = made.points, .normals = made.normals}, [&](double radius) {
-                return Reference{scene::true_visibility(world, made, {.radius_m = radius, .rays = 256}, 4),
-                                 made.normals};
-            });
-        }
+        for (const int stations : {0, 6})
+            run_generated(gauntlet, fmt::format("{}, {}", scene, stations ? "6 stations" : "even"), scene,
+                          [&](const scene::World& world) {
+                              return scene::scanned_cloud(world, generated_points, {.stations = stations});
+                          });
+}
+
+void run_merged(Gauntlet& gauntlet) {
+    for (const char* scene : {"office", "thin", "staircase", "library"})
+        for (const char* sensor : {"kinect", "tof"})
+            for (const bool shuffled : {false, true})
+                run_generated(gauntlet, fmt::format("{}, {} frames{}", scene, sensor, shuffled ? ", shuffled" : ""),
+                              scene, [&](const scene::World& world) {
+                                  return scene::merged_frames(world, merged_points,
+                                                              {.sensor = sensor, .shuffled = shuffled});
+                              });
 }
 
 /// A cloud as the walk reads it; nothing where the file holds a depth image.
@@ -263,7 +286,8 @@ void run_real(Gauntlet& gauntlet, const fs::path& data) {
 int main(int count, char** arguments) {
     using namespace scanshade::gauntlet;
     Gauntlet gauntlet({arguments + 1, arguments + count});
-    run_generated(gauntlet);
+    run_scanned(gauntlet);
+    run_merged(gauntlet);
     run_real(gauntlet, scanshade::tests::data_folder());
     return gauntlet.silently_wrong() ? 1 : 0;
 }
