@@ -126,8 +126,8 @@ class CleanedCloud : public testing::TestWithParam<Slabs> {
         }
     }
     [[nodiscard]] FittedCloud cleaned() const {
-        return cleaned_cloud(LocalCloud(points), points, GetParam().normals ? normals : Points(), GetParam().normals,
-                             0.5, thinning_grid(Vector3d::Zero(), 0.008));
+        return cleaned_cloud(LocalCloud(points), points, GetParam().normals ? normals : Points(), 0.5,
+                             thinning_grid(Vector3d::Zero(), 0.008));
     }
     Points points, normals;
 };
@@ -171,7 +171,7 @@ TEST(CleanedCloud, makes_no_discs_of_points_that_no_plane_explains) {
     for (int i = 0; i < 1500; ++i)
         points.emplace_back(0.8 * dice.roll(), 2 * dice.roll() - 1, 0.1 + 0.8 * dice.roll());
     const FittedCloud cloud =
-        cleaned_cloud(LocalCloud(points), points, {}, false, 0.5, thinning_grid(Vector3d::Zero(), 0.008));
+        cleaned_cloud(LocalCloud(points), points, {}, 0.5, thinning_grid(Vector3d::Zero(), 0.008));
     std::size_t flying = 0;
     for (const Vector3d& point : cloud.points)
         flying += point.z() > 0.06;

@@ -26,10 +26,9 @@ constexpr float one_surface = 0.5F; ///< cosine between normals, at least
 constexpr std::size_t few = 24;     ///< planes that a point chooses from
 constexpr std::size_t in_ball = 80; ///< points that tell a plane: of more, a part is asked
 
-/// The normals of points, some of which may have none (zero), and whether their signs count.
+/// The normals of points, some of which may have none (zero).
 struct PointNormals {
     std::vector<Vector3f> normals; ///< by index in the tree, or empty
-    bool sides = false;
 
     [[nodiscard]] Vector3f of(std::size_t index) const {
         return normals.empty() ? Vector3f(Vector3f::Zero()) : normals[index];
@@ -38,8 +37,7 @@ struct PointNormals {
     [[nodiscard]] float cosine(const Vector3f& a, const Vector3f& b) const {
         if (a.isZero() || b.isZero())
             return 1;
-        const float cosine = a.dot(b);
-        return sides ? cosine : std::abs(cosine);
+        return a.dot(b);
     }
 };
 
@@ -226,8 +224,8 @@ class Windows {
     std::vector<std::uint32_t> found_;
 };
 
-PointNormals facing_of(const NeighbourTree& tree, std::span<const Vector3d> normals, bool sides) {
-    PointNormals facing{{}, sides};
+PointNormals facing_of(const NeighbourTree& tree, std::span<const Vector3d> normals) {
+    PointNormals facing;
     facing.normals.resize(normals.empty() ? 0 : tree.size());
     tbb::parallel_for(std::size_t(0), facing.normals.size(),
                       [&](std::size_t i) { facing.normals[i] = unit_normal(normals[tree.original(i)]); });
@@ -273,10 +271,10 @@ struct Seeds {
 
 class Cleaning {
   public:
-    Cleaning(const LocalCloud& local, std::span<const Vector3d> points, std::span<const Vector3d> normals, bool sides,
+    Cleaning(const LocalCloud& local, std::span<const Vector3d> points, std::span<const Vector3d> normals,
              double radius, const ThinningGrid& grid)
         : tree_(local.tree), middle_(local.middle), points_(points), with_normals_(!normals.empty()),
-          facing_(facing_of(local.tree, normals, sides)), radius_(static_cast<float>(radius)), grid_(grid) {}
+          facing_(facing_of(local.tree, normals)), radius_(static_cast<float>(radius)), grid_(grid) {}
 
     FittedCloud run() {
         Seeds seeds = good(planes_of_seeds());
@@ -305,7 +303,7 @@ class Cleaning {
         std::vector<Keyed> keyed(tree_.size());
         tbb::parallel_for(std::size_t(0), keyed.size(), [&](std::size_t i) {
             const std::uint32_t original = tree_.original(i);
-            const std::uint64_t direction = with_normals_ ? direction_of(facing_.normals[i], facing_.sides) : 6;
+            const std::uint64_t direction = with_normals_ ? direction_of(facing_.normals[i], true) : 6;
             keyed[i] = {voxel(points_[original], grid_.origin, static_cast<double>(radius_) / voxels) << 3 | direction,
                         original, static_cast<std::uint32_t>(i)};
         });
@@ -400,7 +398,7 @@ class Cleaning {
             const WindowPlane& plane = seeds.planes[seeds.tree.original(each.point)];
             constexpr float alike = 0.9F;
             const float cosine = plane.normal.dot(best.normal);
-            if ((facing_.sides ? cosine : std::abs(cosine)) < alike)
+            if ((with_normals_ ? cosine : std::abs(cosine)) < alike)
                 continue;
             const Vector3f apart = at - plane.at;
             const Vector3f facing = cosine < 0 ? Vector3f(-plane.normal) : plane.normal;
@@ -440,8 +438,7 @@ class Cleaning {
             const int size = size_of(point);
             const Vector3d at = point.at.cast<double>() + middle_;
             keyed[i].key = voxel(at, grid_.origin, static_cast<double>(side_of(size))) << 6 |
-                           static_cast<std::uint64_t>(size) << 3 |
-                           direction_of(point.normal, with_normals_ && facing_.sides);
+                           static_cast<std::uint64_t>(size) << 3 | direction_of(point.normal, with_normals_);
         });
         tbb::parallel_sort(keyed.begin(), keyed.end());
         disc_of_.assign(moved_.size(), alone);
@@ -493,7 +490,7 @@ class Cleaning {
                     const Disc& there = discs_[tree.original(other)];
                     constexpr float alike = 0.85F;
                     const float cosine = disc.normal.dot(there.normal);
-                    if ((facing_.sides ? cosine : std::abs(cosine)) < alike)
+                    if ((with_normals_ ? cosine : std::abs(cosine)) < alike)
                         continue;
                     const Vector3f between = (disc.normal + (cosine < 0 ? -1 : 1) * there.normal).normalized();
                     offsets.push_back(
@@ -592,7 +589,7 @@ class Cleaning {
 std::vector<std::optional<Slab>> slabs_around(const NeighbourTree& tree, std::span<const Vector3d> normals,
                                               std::span<const std::size_t> indices, float widest) {
     const Pyramid pyramid(tree, {});
-    const PointNormals facing = facing_of(tree, normals, true);
+    const PointNormals facing = facing_of(tree, normals);
     std::vector<std::optional<Slab>> slabs(indices.size());
     tbb::parallel_for(std::size_t(0), slabs.size(), [&](std::size_t k) {
         if (const WindowPlane plane = Windows(pyramid, facing, widest).around(indices[k]); plane.radius > 0)
@@ -612,8 +609,8 @@ bool noise_exceeds_spacing(std::span<const std::optional<Slab>> slabs) {
 }
 
 FittedCloud cleaned_cloud(const LocalCloud& local, std::span<const Vector3d> points, std::span<const Vector3d> normals,
-                          bool sides, double radius, const ThinningGrid& grid) {
-    return Cleaning(local, points, normals, sides, radius, grid).run();
+                          double radius, const ThinningGrid& grid) {
+    return Cleaning(local, points, normals, radius, grid).run();
 }
 
 } // namespace scanshade

@@ -32,10 +32,10 @@ struct Slab {
 ///    once more.
 ///
 /// Points that no plane explains make no disc, and have the value of the nearest one. `normals` is empty or holds one
-/// per point; `sides`: their signs tell surfaces apart. Windows are at most 0.7 `radius` wide. Empty where there are no
+/// per point, whose signs tell surfaces apart. Windows are at most 0.7 `radius` wide. Empty where there are no
 /// planes. Depends on nothing but points near by, but for the seeds' voxels, which are those of `grid`.
 [[nodiscard]] FittedCloud cleaned_cloud(const LocalCloud& local, std::span<const Eigen::Vector3d> points,
-                                        std::span<const Eigen::Vector3d> normals, bool sides, double radius,
+                                        std::span<const Eigen::Vector3d> normals, double radius,
                                         const ThinningGrid& grid);
 
 } // namespace scanshade
