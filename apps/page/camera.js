@@ -75,15 +75,15 @@
         step();
       },
       stop() { ++flight; },
-      /** Column by column, for WebGL: depth from `near` to `far`, y up on the screen. */
+      /** Of points from the eye. Column by column, for WebGL: depth from `near` to `far`, y up on the screen. */
       matrix(aspect, near, far) {
-        const { right, down, forward, eye } = camera, y = 1 / camera.half_height, x = y / aspect;
+        const { right, down, forward } = camera, y = 1 / camera.half_height, x = y / aspect;
         const a = (far + near) / (far - near), b = -2 * far * near / (far - near);
         const rows = [
-          [x * right[0], x * right[1], x * right[2], -x * dot(right, eye)],
-          [-y * down[0], -y * down[1], -y * down[2], y * dot(down, eye)],
-          [a * forward[0], a * forward[1], a * forward[2], -a * dot(forward, eye) + b],
-          [forward[0], forward[1], forward[2], -dot(forward, eye)],
+          [x * right[0], x * right[1], x * right[2], 0],
+          [-y * down[0], -y * down[1], -y * down[2], 0],
+          [a * forward[0], a * forward[1], a * forward[2], b],
+          [forward[0], forward[1], forward[2], 0],
         ];
         return new Float32Array([0, 1, 2, 3].flatMap((column) => rows.map((row) => row[column])));
       },

@@ -237,7 +237,7 @@ std::vector<fs::path> write_points(const fs::path& folder, const fs::path& stem,
     const std::size_t parts = (order.size() + points_in_a_chunk - 1) / points_in_a_chunk;
     const std::string facts =
         fmt::format(",\"parts\":{},\"total\":{},\"of\":{},\"left_out\":{},\"spacing\":{:.5g},\"up\":[{}],"
-                    "\"box\":[{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}]",
+                    "\"box\":[{},{},{},{},{},{}]",
                     parts, shown.size(), finite, finite - in_box, spacing_of(cloud, shown),
                     fmt::format("{:.6g},{:.6g},{:.6g}", cloud.up.x(), cloud.up.y(), cloud.up.z()), box.low.x(),
                     box.low.y(), box.low.z(), box.size.x(), box.size.y(), box.size.z());

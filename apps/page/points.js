@@ -33,13 +33,13 @@
     return [x / length, y / length, z / length];
   };
 
-  /** positions: floats, 3 a point. paint: bytes, red green blue and AO's code. more: confidence's code and a normal. */
+  /** origin: doubles, in the file's system. positions: floats from there, 3 a point, so that a map's coordinates keep their digits. paint: bytes, red green blue and AO's code. more: confidence's code and a normal. */
   const opened_chunk = async (data) => {
     const { count, box } = data, positions = new Float32Array(3 * count), paint = new Uint8Array(4 * count), more = new Uint8Array(4 * count);
     const bytes = await unpacked(data.positions);
     for (let axis = 0; axis < 3; ++axis) {
       const values = whole_numbers(bytes, 2 * count * axis, count);
-      for (let i = 0; i < count; ++i) positions[3 * i + axis] = box[axis] + values[i] * box[3 + axis] / 65535;
+      for (let i = 0; i < count; ++i) positions[3 * i + axis] = values[i] * box[3 + axis] / 65535;
     }
     const colour = data.colour ? await unpacked(data.colour) : null;
     if (colour) {
@@ -63,7 +63,7 @@
         for (let axis = 0; axis < 3; ++axis) more[4 * i + 1 + axis] = Math.round(127 * n[axis]) & 0xff;
       }
     }
-    return { count, positions, paint, more, has: { colour: Boolean(colour), ao: true, confidence: Boolean(data.confidence), normal: Boolean(data.normal), sides: Boolean(data.normal) } };
+    return { count, origin: box.slice(0, 3), positions, paint, more, has: { colour: Boolean(colour), ao: true, confidence: Boolean(data.confidence), normal: Boolean(data.normal), sides: Boolean(data.normal) } };
   };
 
   scanshade.opened_chunk = opened_chunk;
@@ -83,7 +83,7 @@
 
   const in_world = (pose, p, w) => [0, 1, 2].map((i) => pose[4 * i] * p[0] + pose[4 * i + 1] * p[1] + pose[4 * i + 2] * p[2] + w * pose[4 * i + 3]);
 
-  /** A depth frame as a chunk, in world space where it has a pose. Every `stride`-th pixel both ways. */
+  /** A depth frame as a chunk from its camera's place, in world space where it has a pose. Every `stride`-th pixel both ways. */
   const chunk_of_preview = async (preview, pose, stride) => {
     const [width, height] = preview.size, normals = scanshade.normals_of(preview), pixels = await colour_pixels(preview);
     const most = Math.ceil(width / stride) * Math.ceil(height / stride);
@@ -95,7 +95,7 @@
         if (!(z > 0)) continue;
         let p = scanshade.point_of(preview, u, v, z), n = [normals[3 * i], normals[3 * i + 1], normals[3 * i + 2]];
         if (pose) {
-          p = in_world(pose, p, 1);
+          p = in_world(pose, p, 0);
           n = in_world(pose, n, 0);
         }
         positions.set(p, 3 * count);
@@ -105,7 +105,7 @@
         for (let axis = 0; axis < 3; ++axis) more[4 * count + 1 + axis] = Math.round(127 * n[axis]) & 0xff;
         ++count;
       }
-    return { count, positions: positions.subarray(0, 3 * count), paint: paint.subarray(0, 4 * count), more: more.subarray(0, 4 * count),
+    return { count, origin: pose ? [pose[3], pose[7], pose[11]] : [0, 0, 0], positions: positions.subarray(0, 3 * count), paint: paint.subarray(0, 4 * count), more: more.subarray(0, 4 * count),
       has: { colour: Boolean(pixels), ao: Boolean(preview.ao), confidence: Boolean(preview.confidence), normal: true } };
   };
 
@@ -116,9 +116,8 @@
     layout(location = 1) in vec4 paint;
     layout(location = 2) in float sureness;
     layout(location = 3) in vec3 normal;
-    uniform mat4 clip_from_world;
-    uniform vec3 eye, forward;
-    uniform vec3 seen_from;
+    uniform mat4 clip_from_eye;
+    uniform vec3 origin; // from the eye
     uniform float pixels_per_radian, spacing, slope, size, strength, clip_low, clip_high;
     uniform int mode;
     uniform bool has_colour, fronts_only;
@@ -126,17 +125,18 @@
     float linear(float v) { return v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4); }
     float coded(float v) { return v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1.0 / 2.4) - 0.055; }
     void main() {
-      gl_Position = clip_from_world * vec4(position, 1.0);
-      float across = size * (spacing + slope * distance(position, seen_from));
+      vec3 from_eye = origin + position;
+      gl_Position = clip_from_eye * vec4(from_eye, 1.0);
+      float across = size * (spacing + slope * length(position));
       gl_PointSize = clamp(across * pixels_per_radian / max(gl_Position.w, 1e-6), 1.5, 32.0);
       // A room seen from outside opens where its walls' backs would be.
-      if (fronts_only && dot(normal, normal) > 0.1 && dot(normal, position - eye) > 0.0) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+      if (fronts_only && dot(normal, normal) > 0.1 && dot(normal, from_eye) > 0.0) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
       float code = floor(paint.a * 255.0 + 0.5);
       bool known = code > 0.5;
       float ao = clamp(((code - 1.0) / 127.0 - clip_low) / max(clip_high - clip_low, 1e-3), 0.0, 1.0);
       float open = known ? mix(1.0, ao, strength) : 1.0;
       vec3 side = normal;
-      float lit = dot(side, side) > 0.1 ? 0.35 + 0.5 * abs(dot(normalize(side), normalize(position - eye))) : 0.75;
+      float lit = dot(side, side) > 0.1 ? 0.35 + 0.5 * abs(dot(normalize(side), normalize(from_eye))) : 0.75;
       vec3 base = has_colour ? paint.rgb : vec3(lit);
       if (mode == 0) shown = base;
       else if (mode == 1) shown = known ? vec3(ao) : vec3(0.11, 0.16, 0.25);
@@ -187,8 +187,8 @@
     }`;
   const line_vertex = `#version 300 es
     layout(location = 0) in vec3 position;
-    uniform mat4 clip_from_world;
-    void main() { gl_Position = clip_from_world * vec4(position, 1.0); }`;
+    uniform mat4 clip_from_eye;
+    void main() { gl_Position = clip_from_eye * vec4(position, 1.0); }`;
   const line_fragment = `#version 300 es
     precision highp float;
     uniform vec4 tint;
@@ -263,7 +263,7 @@
         gl.enableVertexAttribArray(3);
         gl.vertexAttribPointer(3, 3, gl.BYTE, true, 4, 1);
         gl.bindVertexArray(null);
-        return { vertices, buffers: [position, paint, more], count: chunk.count, has: chunk.has, spacing: chunk.spacing || 0, slope: chunk.slope || 0, seen_from: chunk.seen_from || [0, 0, 0] };
+        return { vertices, buffers: [position, paint, more], count: chunk.count, has: chunk.has, origin: chunk.origin, spacing: chunk.spacing || 0, slope: chunk.slope || 0 };
       },
       upload_lines(positions) {
         const vertices = gl.createVertexArray();
@@ -299,8 +299,7 @@
         gl.clearColor(0, 0, 0, 1);
         gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
         gl.useProgram(points.program);
-        gl.uniformMatrix4fv(points.at.clip_from_world, false, clip);
-        gl.uniform3fv(points.at.eye, camera.eye);
+        gl.uniformMatrix4fv(points.at.clip_from_eye, false, clip);
         gl.uniform1f(points.at.pixels_per_radian, canvas.height / (2 * camera.half_height));
         gl.uniform1f(points.at.size, look.size);
         gl.uniform1f(points.at.strength, look.strength);
@@ -312,7 +311,7 @@
           gl.uniform1f(points.at.spacing, chunk.spacing);
           gl.uniform1f(points.at.slope, chunk.slope);
           gl.uniform1i(points.at.fronts_only, chunk.has.sides && !look.backs ? 1 : 0);
-          gl.uniform3fv(points.at.seen_from, chunk.seen_from);
+          gl.uniform3fv(points.at.origin, chunk.origin.map((value, axis) => value - camera.eye[axis]));
           gl.bindVertexArray(chunk.vertices);
           gl.drawArrays(gl.POINTS, 0, chunk.count);
         }
@@ -334,7 +333,7 @@
         gl.drawArrays(gl.TRIANGLES, 0, 3);
         gl.depthFunc(gl.LESS);
         gl.useProgram(lines.program);
-        gl.uniformMatrix4fv(lines.at.clip_from_world, false, clip);
+        gl.uniformMatrix4fv(lines.at.clip_from_eye, false, clip);
         for (const { shape, tint } of outlines) {
           gl.uniform4fv(lines.at.tint, tint);
           gl.bindVertexArray(shape.vertices);
@@ -345,10 +344,11 @@
     };
   };
 
-  /** The edges of a camera's pyramid, `depth` long, as pairs of points. */
-  const pyramid = (pose, half, depth) => {
-    const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([x, y]) => in_world(pose, [x * half[0] * depth, y * half[1] * depth, depth], 1));
-    const tip = in_world(pose, [0, 0, 0], 1), edges = [];
+  /** The edges of a camera's pyramid, `depth` long, as pairs of points from the eye. */
+  const pyramid = (pose, half, depth, eye) => {
+    const from_eye = (p) => in_world(pose, p, 1).map((value, axis) => value - eye[axis]);
+    const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([x, y]) => from_eye([x * half[0] * depth, y * half[1] * depth, depth]));
+    const tip = from_eye([0, 0, 0]), edges = [];
     for (let i = 0; i < 4; ++i) edges.push(...tip, ...corners[i], ...corners[i], ...corners[(i + 1) % 4]);
     return edges;
   };
@@ -360,8 +360,11 @@
   scanshade.point_view = ({ rows, head }) => {
     const canvas = by_id("point-canvas"), stage = by_id("point-stage"), source_select = by_id("point-source"), colour_select = by_id("point-colour");
     const posed = rows.filter((row) => row.pose);
+    const stem_of = (each) => each?.file("points", ".000.js")?.slice(0, -7);
+    const tiles = rows.filter((each) => stem_of(each) && !each.pose); // clouds of one system, as files have it
     const camera = scanshade.camera();
     scanshade.shown_camera = () => camera;
+    scanshade.shown_box = () => box;
     let painter = null, shown = false, row = null, chunks = [], outlines = [], box = null, facing = [0, 0, 0], loading = 0, source = null, said = "", moving = false, rest = 0, drawn_ms = 0;
 
     for (const [key, label] of modes) colour_select.append(make("option", { value: key, selected: key === "shaded" }, label));
@@ -369,23 +372,37 @@
     // What can be shown for a row. `key` stays the same where changing the frame needs no new points.
     const sources_of = (each) => {
       const sources = [];
-      if (each?.file("points", ".000.js")) sources.push({ key: `cloud ${each.index}`, label: "cloud", load: (take) => load_chunks(each.file("points", ".000.js").slice(0, -7), take) });
+      if (stem_of(each)) sources.push({ key: `cloud ${each.index}`, label: "cloud", load: (take) => load_chunks(stem_of(each), take) });
       if (head.recording_points) sources.push({ key: "recording", label: "recording, merged", world: true, load: (take) => load_chunks(head.recording_points, take) });
       if (each?.file("previews", ".js")) sources.push({ key: `frame ${each.index}`, label: "this frame", world: Boolean(each.pose), load: (take) => load_frames([each], 1, take) });
+      if (tiles.length > 1) sources.push({ key: "clouds", label: "all clouds", load: (take) => load_clouds(tiles, take) });
       if (posed.length > 1 && posed[0].file("previews", ".js")) sources.push({ key: "together", label: "frames together", world: true, load: (take) => load_frames(spread(posed, 24), 2, take) });
       return sources;
     };
     const spread = (all, most) => (all.length <= most ? all : Array.from({ length: most }, (_, i) => all[Math.round(i * (all.length - 1) / (most - 1))]));
 
     /** Chunk after chunk: points/NAME.000.js and on. `take` returns false once the chunks are wanted no more. */
-    const load_chunks = async (stem, take) => {
-      for (let part = 0, parts = 1; part < parts; ++part) {
+    const load_chunks = async (stem, take, most = Infinity) => {
+      for (let part = 0, parts = 1; part < Math.min(parts, most); ++part) {
         const data = await scanshade.load(`${stem}.${String(part).padStart(3, "0")}.js`);
         parts = data.parts;
         const facts = { total: data.total, of: data.of, up: data.up, left_out: data.left_out };
         const chunk = await opened_chunk(data);
         chunk.spacing = 2 * data.spacing || 0.01; // neighbours on the curve are nearer than the points' spacing
-        if (!take(chunk, facts)) return;
+        if (!take(chunk, facts)) return false;
+      }
+      return true;
+    };
+    /** An even sample of each cloud, a million points in all. */
+    const load_clouds = async (some, take) => {
+      const sums = { of: 0, left_out: 0 }, each_most = Math.max(1, Math.floor(10 / some.length));
+      for (const each of spread(some, 64)) {
+        const before = { ...sums };
+        const wanted = await load_chunks(stem_of(each), (chunk, facts) => {
+          for (const sum of Object.keys(sums)) sums[sum] = before[sum] + facts[sum];
+          return take(chunk, { ...facts, ...sums });
+        }, each_most);
+        if (!wanted) return;
       }
     };
     const load_frames = async (some, stride, take) => {
@@ -395,14 +412,13 @@
         const chunk = await chunk_of_preview(preview, each.pose, stride);
         // A pixel covers more the farther away it is; slanted surfaces lie wider apart.
         chunk.slope = 1.3 * stride * preview.step / preview.camera[0];
-        chunk.seen_from = each.pose ? [each.pose[3], each.pose[7], each.pose[11]] : [0, 0, 0];
         if (!take(chunk, {})) return;
       }
     };
 
-    const grow_box = (positions) => {
+    const grow_box = ({ positions, origin }) => {
       const step = 3 * Math.max(1, Math.floor(positions.length / 3 / 20000)), axes = [[], [], []];
-      for (let i = 0; i < positions.length; i += step) for (let axis = 0; axis < 3; ++axis) axes[axis].push(positions[i + axis]);
+      for (let i = 0; i < positions.length; i += step) for (let axis = 0; axis < 3; ++axis) axes[axis].push(origin[axis] + positions[i + axis]);
       for (const values of axes) values.sort((a, b) => a - b);
       const at = (share) => axes.map((values) => values[Math.floor(share * (values.length - 1))] ?? 0);
       const low = at(0.01), high = at(0.99);
@@ -449,13 +465,13 @@
         }
         source.of = facts.of;
         source.left_out = facts.left_out;
-        grow_box(chunk.positions);
+        grow_box(chunk);
         chunks.push(painter.upload(chunk));
         if (chunks.length === 1) {
           offer_modes(chunk.has);
           by_id("point-backs").parentElement.hidden = !chunk.has.sides;
-          if (!keep_view) home(false);
         }
+        if (!keep_view && (chunks.length === 1 || next.key === "clouds")) home(false);
         draw();
         tell();
         return true;
@@ -510,9 +526,9 @@
       const depth = 0.025 * Math.hypot(...box[1].map((value, i) => value - box[0][i]));
       // Cameras close to the eye would fill the picture with their edges.
       const apart = (each) => Math.hypot(...[3, 7, 11].map((at, axis) => each.pose[at] - camera.eye[axis]));
-      const others = spread(posed, 200).filter((each) => each !== row && apart(each) > 4 * depth).flatMap((each) => pyramid(each.pose, half, depth));
+      const others = spread(posed, 200).filter((each) => each !== row && apart(each) > 4 * depth).flatMap((each) => pyramid(each.pose, half, depth, camera.eye));
       if (others.length) outlines.push({ shape: painter.upload_lines(new Float32Array(others)), tint: [0.55, 0.6, 0.66, 1] });
-      if (row?.pose && apart(row) > 2 * depth) outlines.push({ shape: painter.upload_lines(new Float32Array(pyramid(row.pose, half, 1.6 * depth))), tint: [1, 0.75, 0.2, 1] });
+      if (row?.pose && apart(row) > 2 * depth) outlines.push({ shape: painter.upload_lines(new Float32Array(pyramid(row.pose, half, 1.6 * depth, camera.eye))), tint: [1, 0.75, 0.2, 1] });
     };
     let current_preview = null;
 

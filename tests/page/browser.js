@@ -63,6 +63,24 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
       return [...context.getImageData(Math.floor(a * image.width), Math.floor(b * image.height), 1, 1).data.slice(0, 3)];
     }, [shot, x, y]);
   };
+  /** Of two pictures: the mean difference of channels (0 .. 255), and the share of pixels of the first that are not background. */
+  const difference = (a, b) => decoder.evaluate(async (both) => {
+    const [one, other] = await Promise.all(both.map(async (base64) => {
+      const image = new Image();
+      image.src = "data:image/png;base64," + base64;
+      await image.decode();
+      const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
+      context.drawImage(image, 0, 0);
+      return context.getImageData(0, 0, image.width, image.height).data;
+    }));
+    if (one.length !== other.length) return { mean: 255, covered: 0 };
+    let sum = 0, covered = 0;
+    for (let i = 0; i < one.length; i += 4) {
+      for (let channel = 0; channel < 3; ++channel) sum += Math.abs(one[i + channel] - other[i + channel]);
+      covered += Math.max(Math.abs(one[i] - 20), Math.abs(one[i + 1] - 23), Math.abs(one[i + 2] - 27)) > 20;
+    }
+    return { mean: sum / (one.length / 4 * 3), covered: covered / (one.length / 4) };
+  }, [a, b].map((picture) => picture.toString("base64")));
   const apart = (a, b) => Math.max(...a.map((value, i) => Math.abs(value - b[i])));
   const slide = (page, id, value) => page.locator(id).evaluate((element, to) => { element.value = to; element.dispatchEvent(new Event("input", { bubbles: true })); }, value);
   const names = (page) => page.$$eval("#rows tbody tr[data-row]", (lines) => lines.map((line) => line.children[1].textContent));
@@ -319,11 +337,11 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
         const chunk = await scanshade.opened_chunk(await scanshade.load(`${stem}.00${part}.js`));
         const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
         for (let i = 0; i < chunk.count; ++i) for (let axis = 0; axis < 3; ++axis) {
-          low[axis] = Math.min(low[axis], chunk.positions[3 * i + axis]);
-          high[axis] = Math.max(high[axis], chunk.positions[3 * i + axis]);
+          low[axis] = Math.min(low[axis], chunk.origin[axis] + chunk.positions[3 * i + axis]);
+          high[axis] = Math.max(high[axis], chunk.origin[axis] + chunk.positions[3 * i + axis]);
         }
         let sides = 0;
-        for (let i = 0; i < chunk.count; ++i) sides += chunk.positions[3 * i] < (low[0] + high[0]) / 2;
+        for (let i = 0; i < chunk.count; ++i) sides += chunk.origin[0] + chunk.positions[3 * i] < (low[0] + high[0]) / 2;
         all.push({ count: chunk.count, low, high, share: sides / chunk.count });
       }
       return all;
@@ -334,6 +352,34 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
         expect(Math.abs(part.share - 0.75) < 0.01, `a chunk is no even sample: ${part.share}`);
       }
     expect(found[0].count === 100000, `${found[0].count} points in the first chunk`);
+  });
+
+  await check("map coordinates", async (open_page) => {
+    const pictures = {};
+    for (const name of ["origin", "utm", "geocentric"]) {
+      const page = await open_page(spec.tiles[name]);
+      await points_of(page);
+      await page.waitForTimeout(400);
+      pictures[name] = await page.locator("#point-canvas").screenshot();
+    }
+    for (const name of ["utm", "geocentric"]) {
+      const { mean, covered } = await difference(pictures[name], pictures.origin);
+      expect(covered > 0.2, `${name}: ${covered} of the picture is covered`);
+      expect(mean < 1, `${name} differs from the origin by ${mean}`);
+    }
+  });
+
+  await check("tiles", async (open_page) => {
+    const page = await open_page(spec.tiles.both);
+    await points_of(page);
+    await page.selectOption("#point-source", "clouds");
+    await page.waitForFunction(() => document.querySelector("#point-canvas").dataset.loaded === "clouds", null, { timeout: 20000 });
+    expect((await page.textContent("#point-readout")).startsWith("24,000 points"), await page.textContent("#point-readout"));
+    const [low, high] = await page.evaluate(() => scanshade.shown_box());
+    for (const [axis, length] of [[0, 40], [1, 20]]) {
+      expect(Math.abs(low[axis] - spec.utm[axis]) < 0.5, `the box begins at ${low}`);
+      expect(Math.abs(high[axis] - low[axis] - length) < 1, `the box is from ${low} to ${high}`);
+    }
   });
 
   await check("without WebGL", async (open_page) => {

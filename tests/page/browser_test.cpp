@@ -4,8 +4,10 @@
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
 #include "projection/base/error.h"
+#include "tests/support/files.h"
 #include "tests/support/points.h"
 #include "tests/support/small_capture.h"
+#include "tests/support/tile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -125,6 +127,7 @@ class BrowserTest : public testing::Test {
         spec["cloud_said"] = "110,000 points of 110,001, 1 far away left out";
         spec["cloud_stem"] = "points/corner";
         spec["cloud_box"] = {{0, 0, 0}, {2, 2, 2}};
+        add_tiles(spec, home);
         add_hostile(spec, home);
         must(fmt::format("run '{0}/office' '{0}/corner.ply' -o '{0}/list' --frames 0:1", home.string()));
         must(fmt::format("run '{0}/office' -o '{0}/old' --page no --frames 0:2", home.string()));
@@ -163,6 +166,23 @@ class BrowserTest : public testing::Test {
                     spec["dark"] = {u, v};
                 }
             }
+    }
+
+    /// The same tile at the origin, in UTM and geocentric coordinates; and two tiles side by side as one capture.
+    static void add_tiles(nlohmann::json& spec, const fs::path& home) {
+        const Eigen::Vector3d utm(448262, 5411932, 120), geocentric(4157222, 664789, 4774952);
+        for (const auto& [name, shift] :
+             {std::pair<const char*, Eigen::Vector3d>{"origin", {0, 0, 0}}, {"utm", utm}, {"geocentric", geocentric}}) {
+            (void)tests::write_file(home / "tiles" / name / "tile.las", tests::tile(shift));
+            must(fmt::format("run '{0}/tiles/{1}/tile.las' -o '{0}/tiles/{1}/out'", home.string(), name));
+            spec["tiles"][name] = home / "tiles" / name / "out/index.html";
+        }
+        (void)tests::write_file(home / "tiles/both/a.las", tests::tile(utm));
+        (void)tests::write_file(home / "tiles/both/b.las",
+                                tests::tile(utm + Eigen::Vector3d(tests::tile_side_m, 0, 0)));
+        must(fmt::format("run '{0}/tiles/both' -o '{0}/tiles/both/out'", home.string()));
+        spec["tiles"]["both"] = home / "tiles/both/out/index.html";
+        spec["utm"] = {utm.x(), utm.y(), utm.z()};
     }
 
     static void add_hostile(nlohmann::json& spec, const fs::path& home) {
@@ -237,6 +257,8 @@ TEST_F(BrowserTest, the_view_flies_to_the_camera_of_the_chosen_frame_and_turns_b
 TEST_F(BrowserTest, each_chunk_of_a_cloud_is_an_even_sample_and_strays_are_counted) {
     EXPECT_EQ(found("points of a cloud"), "");
 }
+TEST_F(BrowserTest, map_coordinates_are_drawn_as_those_round_the_origin) { EXPECT_EQ(found("map coordinates"), ""); }
+TEST_F(BrowserTest, tiles_of_a_capture_lie_side_by_side) { EXPECT_EQ(found("tiles"), ""); }
 TEST_F(BrowserTest, without_webgl_the_page_says_so_and_the_rest_works) { EXPECT_EQ(found("without WebGL"), ""); }
 TEST_F(BrowserTest, hostile_names_are_shown_and_never_run) { EXPECT_EQ(found("hostile names"), ""); }
 TEST_F(BrowserTest, what_gets_into_a_page_is_neither_run_nor_loaded) {
