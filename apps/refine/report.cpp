@@ -213,15 +213,16 @@ std::string heat_map(const cv::Mat_<Number>& grid, const char* caption, const ch
     double most = 1e-12;
     for (const Number value : grid)
         most = std::isfinite(static_cast<double>(value)) ? std::max(most, static_cast<double>(value)) : most;
-    std::string svg = fmt::format("<figure><svg viewBox='0 0 {} {}' width='480'>", grid.cols * cell, grid.rows * cell);
+    std::string svg = fmt::format("<figure><svg class=\"cells\" viewBox=\"0 0 {} {}\" width=\"480\">", grid.cols * cell,
+                                  grid.rows * cell);
     for (int row = 0; row < grid.rows; ++row)
         for (int column = 0; column < grid.cols; ++column) {
             const double value = grid(row, column);
-            svg += fmt::format("<rect x='{}' y='{}' width='{}' height='{}' fill='{}'/>", column * cell, row * cell,
-                               cell, cell, std::isfinite(value) ? shade_of(value / most) : "#ddd");
+            svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{}\"/>", column * cell,
+                               row * cell, cell, cell, std::isfinite(value) ? shade_of(value / most) : "#ddd");
             if (std::isfinite(value))
-                svg += fmt::format("<text x='{}' y='{}'>{}</text>", column * cell + cell / 2, row * cell + cell / 2 + 5,
-                                   fmt::format(fmt::runtime(format), value));
+                svg += fmt::format("<text x=\"{}\" y=\"{}\">{}</text>", column * cell + cell / 2,
+                                   row * cell + cell / 2 + 5, fmt::format(fmt::runtime(format), value));
         }
     return svg + fmt::format("</svg><figcaption>{}</figcaption></figure>\n", caption);
 }
@@ -233,10 +234,10 @@ std::string arrows(const Refinement& r) {
     constexpr std::size_t most = 4000;
     const std::size_t step = std::max<std::size_t>(1, r.residuals.size() / most);
     std::string svg =
-        fmt::format("<figure><svg viewBox='0 0 {} {}' width='640' class='framed'>", size.width, size.height);
+        fmt::format("<figure><svg viewBox=\"0 0 {} {}\" width=\"640\" class=\"residuals\">", size.width, size.height);
     for (std::size_t i = 0; i < r.residuals.size(); i += step) {
         const auto& [at, error] = r.residuals[i];
-        svg += fmt::format("<path d='M{:.1f} {:.1f}l{:.1f} {:.1f}'/>", at.x, at.y, error.x() * exaggeration,
+        svg += fmt::format("<path d=\"M{:.1f} {:.1f}l{:.1f} {:.1f}\"/>", at.x, at.y, error.x() * exaggeration,
                            error.y() * exaggeration);
     }
     return svg +
@@ -250,11 +251,10 @@ std::string scatter(const Refinement& r) {
     const double reach = std::max(4 * r.selection.train_px, 1e-9), scale = 150 / reach;
     constexpr std::size_t most = 4000;
     const std::size_t step = std::max<std::size_t>(1, r.residuals.size() / most);
-    std::string svg =
-        "<figure><svg viewBox='-160 -160 320 320' width='320' class='framed'><path class='axis' d='M-150 0h300M0 "
-        "-150v300'/>";
+    std::string svg = "<figure><svg viewBox=\"-160 -160 320 320\" width=\"320\" class=\"residuals\">"
+                      "<path class=\"axis\" d=\"M-150 0h300M0 -150v300\"/>";
     for (std::size_t i = 0; i < r.residuals.size(); i += step)
-        svg += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='1.5'/>",
+        svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"1.5\"/>",
                            std::clamp(r.residuals[i].second.x() * scale, -155.0, 155.0),
                            std::clamp(r.residuals[i].second.y() * scale, -155.0, 155.0));
     return svg + fmt::format("</svg><figcaption>Residuals, axes +-{:.2g} px</figcaption></figure>\n", reach);
@@ -265,27 +265,19 @@ std::string view_bars(const Refinement& r) {
     double most = 1e-12;
     for (const ViewRow& view : r.views)
         most = std::max(most, view.score.rms());
-    std::string svg = fmt::format("<svg viewBox='0 0 640 {}' width='640' class='bars'>", line * r.views.size() + 4);
+    std::string svg =
+        fmt::format("<svg viewBox=\"0 0 640 {}\" width=\"640\" class=\"bars\">", line * r.views.size() + 4);
     for (std::size_t i = 0; i < r.views.size(); ++i) {
         const ViewRow& view = r.views[i];
         const double width = 380 * view.score.rms() / most;
-        svg += fmt::format(
-            "<text class='name' x='160' y='{0}'>{1}</text><rect x='166' y='{2}' width='{3:.1f}' height='12' "
-            "class='{4}'/><text class='value' x='{5:.1f}' y='{0}'>{6:.3g} {8}{7}</text>",
-            line * i + 14, page::escaped(view.name), line * i + 4, width, view.outlying ? "bad" : "good", 172 + width,
-            view.score.rms(), view.used ? "" : ", dropped", r.unit);
+        svg += fmt::format("<text class=\"name\" x=\"160\" y=\"{0}\">{1}</text>"
+                           "<rect x=\"166\" y=\"{2}\" width=\"{3:.1f}\" height=\"12\" class=\"{4}\"/>"
+                           "<text class=\"value\" x=\"{5:.1f}\" y=\"{0}\">{6:.3g} {8}{7}</text>",
+                           line * i + 14, page::escaped(view.name), line * i + 4, width, view.outlying ? "bad" : "good",
+                           172 + width, view.score.rms(), view.used ? "" : ", dropped", r.unit);
     }
     return svg + "</svg>\n";
 }
-
-/// For the plots of this page alone.
-constexpr const char* style =
-    "<style>figure{display:inline-block;margin:.5em 1em .5em 0}figcaption{color:#555;font-size:13px}figure "
-    "text{font:15px "
-    "sans-serif;text-anchor:middle}.bars text{font:12px sans-serif}.bars .name{text-anchor:end}figure path{stroke:#c33;"
-    "stroke-width:1.2}figure .axis{stroke:#bbb}figure circle{fill:#36a;fill-opacity:.4}.framed{border:1px solid "
-    "#999}.good{"
-    "fill:#58a}.bad{fill:#c33}</style>\n";
 
 } // namespace
 
@@ -308,14 +300,14 @@ std::string page_of(const Refinement& r, double took_s) {
         errors.push_back({"full model, for comparison", number(r.full->train_px), number(r.full->held_out_px)});
 
     std::string found =
-        style + page::paragraph(verdict_of(r)) + page::paragraph(fmt::format("From {}; {:.1f} s.", r.source, took_s));
+        page::paragraph(verdict_of(r)) + page::paragraph(fmt::format("From {}; {:.1f} s.", r.source, took_s));
     for (const std::string& note : r.notes)
         found += page::paragraph(note);
     std::vector<page::Section> sections = {
         {"Found", found},
-        {"Numbers", page::table({"", "before", "after", "sigma"}, numbers)},
-        {fmt::format("Error, {} rms", r.unit), page::table({"", "fitted views", "held-out views"}, errors)},
-        {"Model selection", page::table({"parameters", "", "why"}, steps, freed)},
+        {"Numbers", page::table({"number", "before", "after", "sigma"}, numbers)},
+        {fmt::format("Error, {} rms", r.unit), page::table({"camera", "fitted views", "held-out views"}, errors)},
+        {"Model selection", page::table({"parameters", "decision", "why"}, steps, freed)},
         {"Residuals", r.residuals.empty() ? page::paragraph("of depth, not of pixels") : arrows(r) + scatter(r)},
         {"Views", view_bars(r)},
         {"Image", heat_map(r.coverage.counts, "Observations", "{:.0f}") +
