@@ -21,6 +21,7 @@
     return { right: r, down: cross(f, r), forward: f };
   };
 
+  scanshade.looking = looking;
   scanshade.camera = () => {
     const camera = { eye: [0, 0, 0], ...looking([0, 0, 1], [0, 1, 0]), up: [0, -1, 0], distance: 2, half_height: Math.tan(25 * Math.PI / 180) };
     let flight = 0;
@@ -47,13 +48,24 @@
         camera.distance = Math.max(1e-6, camera.distance / factor);
         about(centre);
       },
-      /** Before everything in the box, from in front and above; from the side that most of it faces, the mean normal's. */
-      frame_box(low, high, facing) {
-        const centre = low.map((value, i) => (value + high[i]) / 2), size = Math.hypot(...high.map((value, i) => value - low[i])) || 1;
+      /** Before the points of `sample` in the box, which fill the picture, from in front and above; from the side that most of it faces, the mean normal's. */
+      frame_box(low, high, facing, sample, aspect) {
         const ahead = Math.abs(camera.up[2]) > 0.5 ? [0.5, 0.8, 0] : [0.3, 0, 0.95];
         Object.assign(camera, looking(add(add(ahead, camera.up, -0.45), facing, -2.5), camera.up.map((value) => -value)));
         camera.half_height = Math.tan(25 * Math.PI / 180);
-        camera.distance = 0.36 * size / camera.half_height;
+        const beside = high.map((value, i) => 0.1 * (value - low[i])); // the box leaves out the outermost points, strays or not
+        const within = sample.filter((place) => place.every((value, i) => value >= low[i] - beside[i] && value <= high[i] + beside[i])), margin = 0.95, half = camera.half_height;
+        let centre = low.map((value, i) => (value + high[i]) / 2);
+        camera.distance = 0;
+        for (let round = 0; round < 4; ++round) { // the centre of what is seen depends on the distance
+          const places = within.map((place) => [camera.right, camera.down, camera.forward].map((axis) => dot(axis, add(place, centre, -1))));
+          camera.distance = places.reduce((most, [x, y, z]) => Math.max(most, Math.abs(x) / (margin * half * aspect) - z, Math.abs(y) / (margin * half) - z), 0) || 1;
+          const middle = (at) => {
+            const shares = places.map((place) => place[at] / Math.max(1e-9, camera.distance + place[2]));
+            return camera.distance * (Math.min(...shares) + Math.max(...shares)) / 2;
+          };
+          if (round < 3 && places.length > 0) centre = add(add(centre, camera.right, middle(0)), camera.down, middle(1));
+        }
         about(centre);
       },
       /** To a place with axes and angle of view; at once where people ask for less motion. */

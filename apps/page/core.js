@@ -80,6 +80,12 @@ scanshade.unpacked = async (base64) => {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 };
 
+/** `make`, called at the first call and never again. */
+scanshade.once = (make) => {
+  let made = null;
+  return () => (made ??= make());
+};
+
 /** Keeps the latest results of `make`, so that going back and forth loads nothing again. */
 scanshade.cache = (most, make) => {
   const kept = new Map();

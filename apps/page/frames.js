@@ -60,7 +60,7 @@
     const mix = () => {
       const tops = Object.values(layers).flatMap((layer) => [...layer.querySelectorAll(".mixes")]);
       for (const top of tops) top.style.opacity = strength.value;
-      strength.disabled = tops.length === 0;
+      strength.parentElement.hidden = tops.length === 0;
     };
 
     const fill = (side) => {
@@ -107,7 +107,11 @@
       fill("right");
       const none = !kind_of("left");
       empty.hidden = !none;
-      divider.hidden = none;
+      // One image alone needs neither choice nor divider.
+      const one = kinds.filter((kind) => kind.there(row, preview)).length < 2;
+      divider.hidden = one;
+      by_id("fit").hidden = none;
+      for (const side of ["left", "right"]) by_id(side).parentElement.hidden = one;
       if (none) empty.textContent = row.why || "this frame has no images";
       const left = kind_of("left"), right = kind_of("right");
       tell([left, right].map((kind) => (kind?.note && preview ? kind.note(row, preview) : "")).find(Boolean) || "");

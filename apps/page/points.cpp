@@ -2,6 +2,7 @@
 #include "apps/page/points.h"
 
 #include "ao/raycast/low_discrepancy.h"
+#include "apps/json.h"
 #include "apps/page/text.h"
 #include "io/output_file.h"
 #include "projection/base/indices_where.h"
@@ -14,8 +15,10 @@
 #include <cstdint>
 #include <fmt/format.h>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 #include <tbb/parallel_sort.h>
 
 namespace scanshade::page {
@@ -165,6 +168,90 @@ std::array<std::uint8_t, 2> normal_codes(const Eigen::Vector3f& normal) {
     return codes == std::array<std::uint8_t, 2>{} ? std::array<std::uint8_t, 2>{255, 255} : codes;
 }
 
+/// How a field is stored: 0 = none, 1 .. 65535 = low .. high in even steps.
+struct Scale {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    bool holes = false, whole = false;
+
+    static constexpr double steps = 65534;
+    /// 3e38 and the like mark what is not known, as in coordinates.
+    [[nodiscard]] static bool is_known(double value) { return std::abs(value) <= 1e30; }
+    void take(double value) {
+        holes = holes || !is_known(value);
+        low = is_known(value) ? std::min(low, value) : low;
+        high = is_known(value) ? std::max(high, value) : high;
+    }
+    [[nodiscard]] bool known() const { return low <= high; }
+    [[nodiscard]] double step() const { return whole && high - low <= steps ? 1 : (high - low) / steps; }
+    /// Whether a code a point is needed.
+    [[nodiscard]] bool varies() const { return holes || low < high; }
+    [[nodiscard]] std::uint16_t code(double value) const {
+        return is_known(value) ? static_cast<std::uint16_t>(1.5 + (low < high ? (value - low) / step() : 0))
+                               : std::uint16_t(0);
+    }
+};
+
+/// Of those fields that are written, over the points shown.
+std::vector<Scale> scales_of(const Points& cloud, const std::vector<std::uint32_t>& shown) {
+    std::vector<Scale> none(std::min(cloud.fields.size(), most_fields));
+    for (std::size_t i = 0; i < none.size(); ++i)
+        none[i].whole = cloud.fields[i].whole;
+    if (none.empty())
+        return none;
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, shown.size()), none,
+        [&](const tbb::blocked_range<std::size_t>& range, std::vector<Scale> scales) {
+            std::vector<double> values(cloud.fields.size());
+            for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                cloud.read(shown[i], values);
+                for (std::size_t k = 0; k < scales.size(); ++k)
+                    scales[k].take(values[k]);
+            }
+            return scales;
+        },
+        [](std::vector<Scale> a, const std::vector<Scale>& b) {
+            for (std::size_t k = 0; k < a.size(); ++k) {
+                a[k].low = std::min(a[k].low, b[k].low), a[k].high = std::max(a[k].high, b[k].high);
+                a[k].holes = a[k].holes || b[k].holes;
+            }
+            return a;
+        });
+}
+
+/// Names and scales of the fields that have a value anywhere, for every chunk.
+std::string fields_text(const Points& cloud, const std::vector<Scale>& scales) {
+    json fields = json::array();
+    for (std::size_t k = 0; k < scales.size(); ++k)
+        if (scales[k].known())
+            fields.push_back({{"name", cloud.fields[k].name},
+                              {"low", scales[k].low},
+                              {"high", scales[k].high},
+                              {"step", scales[k].step()},
+                              {"whole", scales[k].whole}});
+    return for_script(json_line(fields));
+}
+
+/// The codes of these fields, one text each; empty where all points have `low`.
+std::string codes_text(const Points& cloud, const std::vector<Scale>& scales, std::span<const std::uint32_t> chunk) {
+    std::vector<std::vector<std::uint16_t>> codes(scales.size(), std::vector<std::uint16_t>(chunk.size()));
+    std::vector<double> values(cloud.fields.size());
+    for (std::size_t i = 0; i < chunk.size() && !scales.empty(); ++i) {
+        cloud.read(chunk[i], values);
+        for (std::size_t k = 0; k < scales.size(); ++k)
+            codes[k][i] = scales[k].known() ? scales[k].code(values[k]) : std::uint16_t(0);
+    }
+    std::string text, bytes;
+    for (std::size_t k = 0; k < scales.size(); ++k) {
+        if (!scales[k].known())
+            continue;
+        bytes.clear();
+        if (scales[k].varies())
+            append_planes(bytes, codes[k]);
+        text += fmt::format("{}\"{}\"", text.empty() ? "" : ",", bytes.empty() ? "" : packed(bytes));
+    }
+    return text;
+}
+
 /// The parts of a chunk; `chunk` holds indices of points, along the curve.
 std::string parts_of(const Points& cloud, const Box& box, std::span<const std::uint32_t> chunk) {
     std::string bytes;
@@ -235,12 +322,14 @@ std::vector<fs::path> write_points(const fs::path& folder, const fs::path& stem,
         indices_where(cloud.points.size(), [&](std::size_t i) { return cloud.points[i].allFinite(); }).size();
     std::vector<std::uint32_t> order = even_order(shown.size());
     const std::size_t parts = (order.size() + points_in_a_chunk - 1) / points_in_a_chunk;
+    const std::vector<Scale> scales = scales_of(cloud, shown);
     const std::string facts =
         fmt::format(",\"parts\":{},\"total\":{},\"of\":{},\"left_out\":{},\"spacing\":{:.5g},\"up\":[{}],"
-                    "\"box\":[{},{},{},{},{},{}]",
+                    "\"box\":[{},{},{},{},{},{}],\"fields\":{},\"more_fields\":{}",
                     parts, shown.size(), finite, finite - in_box, spacing_of(cloud, shown),
                     fmt::format("{:.6g},{:.6g},{:.6g}", cloud.up.x(), cloud.up.y(), cloud.up.z()), box.low.x(),
-                    box.low.y(), box.low.z(), box.size.x(), box.size.y(), box.size.z());
+                    box.low.y(), box.low.z(), box.size.x(), box.size.y(), box.size.z(), fields_text(cloud, scales),
+                    cloud.fields.size() - scales.size());
     std::vector<fs::path> files(parts);
     tbb::parallel_for(std::size_t(0), parts, [&](std::size_t part) {
         const auto begin = order.begin() + static_cast<std::ptrdiff_t>(part * points_in_a_chunk);
@@ -249,8 +338,10 @@ std::vector<fs::path> write_points(const fs::path& folder, const fs::path& stem,
         std::vector<std::uint32_t> chunk(static_cast<std::size_t>(end - begin));
         std::transform(begin, end, chunk.begin(), [&](std::uint32_t place) { return shown[place]; });
         files[part] = fs::path(fmt::format("{}.{:03}.js", stem.string(), part));
-        write_atomically(folder / files[part], fmt::format("scanshade.points({{\"part\":{},\"count\":{}{}{}}})\n", part,
-                                                           chunk.size(), facts, parts_of(cloud, box, chunk)));
+        write_atomically(folder / files[part],
+                         fmt::format("scanshade.points({{\"part\":{},\"count\":{}{}{},\"codes\":[{}]}})\n", part,
+                                     chunk.size(), facts, parts_of(cloud, box, chunk),
+                                     codes_text(cloud, scales, chunk)));
     });
     return files;
 }

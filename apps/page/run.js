@@ -1,7 +1,7 @@
 // The page of a run or of a comparison: its head, and the parts joined. The last script of all.
 "use strict";
 scanshade.parts.push(() => {
-  const { by_id, make, fixed, duration, head } = scanshade;
+  const { by_id, make, fixed, duration, address, link, head } = scanshade;
   const statuses = ["failed", "skipped", "doubtful", "ok"];
   const marks = { ok: "●", doubtful: "▲", failed: "✕", skipped: "–" };
   const stages = ["load", "project", "compute", "attach", "write"];
@@ -23,6 +23,11 @@ scanshade.parts.push(() => {
     };
   });
   rows.forEach((row, i) => { row.position = i; });
+  // Clouds without images: their points come first, their pictures beside.
+  const is_cloud = (row) => scanshade.has_cloud(row) && !row.file("previews", ".js");
+  const of_clouds = rows.length > 0 && rows.every((row) => is_cloud(row) || row.status === "failed") && rows.some(is_cloud), alone = rows.length === 1;
+  const points_in = (row) => `${(row.width * row.height).toLocaleString("en")} points`;
+  const counted = (count) => (of_clouds && alone ? points_in(rows[0]) : `${count} ${of_clouds ? "cloud" : "frame"}${count === 1 ? "" : "s"}`);
 
   // -------------------------------------------------------------------------------------------------- the head
 
@@ -31,12 +36,17 @@ scanshade.parts.push(() => {
   text("title", head.title);
   document.title = `${head.title} · scanshade`;
   text("subtitle", head.subtitle);
-  for (const [name, value] of head.facts) by_id("facts").append(make("div", {}, make("dt", {}, name), make("dd", {}, value)));
+  for (const [name, value] of head.facts) if (!(alone && name === "frames/s")) by_id("facts").append(make("div", {}, make("dt", {}, name), make("dd", {}, value)));
+  // Where frames failed, what can be done about it comes first: warnings of the capture say it, as the terminal does.
+  const failed = rows.filter((row) => row.status === "failed"), advice = head.notes.filter((note) => note.startsWith("warning: ")).map((note) => note.slice(9));
+  if (failed.length > 0 && head.lead) head.notes.unshift(head.lead);
+  const lead = failed.length === 0 ? head.lead || "" : [`${failed.length} of ${rows.length} failed: ${failed[0].why}.`, ...advice,
+    "Once the cause is mended, run the command again with --resume --retry; it is below, under Details."].join(" ");
   for (const note of head.notes) by_id("notes").append(make("li", {}, note));
   by_id("notes").parentElement.hidden = head.notes.length === 0;
 
-  by_id("lead").hidden = !head.lead;
-  text("lead", head.lead || "");
+  by_id("lead").hidden = !lead;
+  text("lead", lead);
   const by_status = new Map(statuses.map((status) => [status, rows.filter((row) => row.status === status).length]));
   let only = null;
   const chips = [["all", rows.length], ...by_status].filter(([name, count]) => name === "all" || count > 0).map(([name, count]) => {
@@ -44,7 +54,7 @@ scanshade.parts.push(() => {
       only = name === "all" ? null : name;
       for (const other of chips) other.setAttribute("aria-pressed", String(other === chip));
       narrow();
-    } }, name === "all" ? `${count} ${count === 1 ? "frame" : "frames"}` : `${marks[name]} ${count} ${name}`);
+    } }, name === "all" ? counted(count) : `${marks[name]} ${count} ${name}`);
     return chip;
   });
   by_id("counts").append(...chips);
@@ -117,10 +127,13 @@ scanshade.parts.push(() => {
     points.select(row);
     const about = by_id("about");
     about.replaceChildren(
-      make("p", {}, make("span", { class: `status ${row.status}` }, `${marks[row.status]} ${row.status}`), row.width ? ` · ${row.width} × ${row.height}` : "",
+      make("p", {}, make("span", { class: `status ${row.status}` }, `${marks[row.status]} ${row.status}`), row.width ? ` · ${is_cloud(row) && row.height === 1 ? points_in(row) : `${row.width} × ${row.height}`}` : "",
         ...(of_errors ? [` · RMSE ${fixed(row.errors.rmse ?? NaN, 4)}`] : [` · coverage ${fixed(row.coverage, 3)} · AO ${fixed(row.visibility, 3)} · ${duration(row.total)}`])),
       ...[row.why, ...row.warnings, ...row.notes].filter(Boolean).map((each) => make("p", { class: "said" }, each)));
-    history.replaceState(null, "", `#${row.index}`);
+    const pictures = is_cloud(row) ? ["shaded", "panel"].map((folder) => row.file(folder, ".png")).filter(Boolean) : [];
+    by_id("beside").replaceChildren(...pictures.map((path) => make("a", { href: address(path) }, make("img", { src: address(path), alt: `Two views of ${row.name}, in its colours and as AO` }))));
+    by_id("beside").hidden = pictures.length === 0;
+    link.put("row", String(row.index));
   };
 
   const table = scanshade.table(by_id("rows"), { columns, label: "Frames", worst, on_select: go, on_open: () => by_id("viewer").scrollIntoView(), id_of: (row) => row.index });
@@ -156,7 +169,11 @@ scanshade.parts.push(() => {
 
   // -------------------------------------------------------------------------------------------------- switching, keys
 
-  by_id("show-frame").parentElement.hidden = of_errors; // maps without depth have no points
+  by_id("show-frame").parentElement.hidden = of_errors || failed.length === rows.length; // maps without depth have no points
+  if (of_clouds) by_id("show-frame").textContent = "Picture";
+  // One row has nothing to go to, to sort or to compare.
+  for (const id of ["list", "strip"]) by_id(id).hidden = alone;
+  by_id("previous").parentElement.hidden = alone;
 
   const show_points = (wanted) => {
     by_id("frame-view").hidden = wanted;
@@ -186,8 +203,9 @@ scanshade.parts.push(() => {
 
   table.show(rows);
   frames.fill(rows);
-  const asked = rows.find((row) => `#${row.index}` === location.hash);
+  const asked = rows.find((row) => String(row.index) === link.row);
   go(asked || table.order()[0]);
+  if (link.has("points") || (current && is_cloud(current))) show_points(true);
   if (rows.length === 0) text("shown", "no frames");
   document.documentElement.dataset.ready = "yes"; // for whoever measures
 });

@@ -86,7 +86,9 @@ std::string shell(const Part& body, std::string_view title, const std::vector<Pa
 } // namespace
 
 std::string run_shell(std::string_view title) {
-    return shell(page_html, title, {core_js, table_js, plots_js, maps_js, frames_js, camera_js, points_js, run_js});
+    return shell(page_html, title,
+                 {core_js, link_js, table_js, plots_js, maps_js, frames_js, camera_js, chunks_js, sources_js,
+                  painter_js, colourings_js, colour_control_js, clip_js, picking_js, points_js, run_js});
 }
 
 std::string list_shell(std::string_view title) { return shell(list_html, title, {core_js, table_js, list_js}); }

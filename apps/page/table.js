@@ -2,13 +2,13 @@
 "use strict";
 {
   const { make } = scanshade;
-  const row_height = 30; // px, as the style has it
 
   /**
-   * columns: {key, label, value(row), text(row), numeric, kind(row), title}. `worst` gives the order of the first look:
+   * columns: {key, label, value(row), text(row), numeric, kind(row), title, picture(row)}. `row_height`: px. `worst` gives the order of the first look:
    * smaller is worse. Returns {show(rows), select(row), step(by), sort_worst(), order()}.
    */
-  scanshade.table = (place, { columns, label, worst, on_select, on_open, id_of }) => {
+  scanshade.table = (place, { columns, label, worst, on_select, on_open, id_of, row_height = 30 }) => {
+    place.style.setProperty("--row", `${row_height}px`);
     let rows = [], shown = [], selected = null, sorted_by = null, falling = false, test = () => true;
 
     const head = make("tr");
@@ -62,8 +62,9 @@
         const line = make("tr", { "aria-rowindex": from + i + 2, "aria-selected": String(row === selected), "data-row": id_of(row) });
         for (const column of columns) {
           const text = column.text ? column.text(row) : String(column.value(row));
-          const cell = make("td", { class: (column.numeric ? "number " : "") + (column.kind ? column.kind(row) : ""), title: text.length > 18 ? text : null });
-          if (column.link && column.link(row)) cell.append(make("a", { href: column.link(row) }, text));
+          const cell = make("td", { class: (column.numeric ? "number " : "") + (column.kind ? column.kind(row) : "") });
+          if (column.picture?.(row)) cell.append(make("img", { src: column.picture(row), alt: "", loading: "lazy" }));
+          else if (column.link && column.link(row)) cell.append(make("a", { href: column.link(row) }, text));
           else cell.append(text);
           line.append(cell);
         }

@@ -9,6 +9,7 @@
 #include "apps/results/cloud_picture.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/glb.h"
+#include "io/clouds/number_fields.h"
 #include "io/images/npy_file.h"
 #include "io/output_file.h"
 
@@ -193,12 +194,20 @@ std::filesystem::path write_cloud_picture(const Work& work, const Outputs& outpu
 std::vector<std::filesystem::path> write_page_points(const Work& work, const Outputs& outputs) {
     const Cloud& cloud = *work.frame.cloud;
     const std::optional<Eigen::Vector3d> viewpoint = scanner_of(work.frame);
+    const std::vector<NumberField> numbers = cloud.records ? number_fields(*cloud.records) : std::vector<NumberField>();
+    std::vector<page::Field> fields;
+    for (const NumberField& each : numbers)
+        fields.push_back({each.name, each.whole});
     const page::Points points{.points = cloud.points,
                               .colours = has_colours(cloud) ? std::span(cloud.colours) : std::span<const cv::Vec3b>(),
                               .visibility = work.attached.per_point,
                               .confidence = work.confidence.per_point,
                               .normals = work.of_points.normals,
-                              .up = up_of(cloud, work.of_points, viewpoint)};
+                              .up = up_of(cloud, work.of_points, viewpoint),
+                              .fields = std::move(fields),
+                              .read = [&](std::size_t point, std::span<double> values) {
+                                  read_numbers(*cloud.records, numbers, point, values);
+                              }};
     return page::write_points(outputs.files_folder(), std::filesystem::path("points") / work.entry.name, points,
                               outputs.page_points);
 }

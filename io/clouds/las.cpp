@@ -3,6 +3,7 @@
 #include "io/clouds/cloud_records.h"
 
 #include "io/clouds/laz/laz.h"
+#include "io/clouds/number_fields.h"
 #include "io/file_bytes.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -419,6 +420,24 @@ CloudShape las_shape(const FileBytes& file, std::vector<std::string>& warnings) 
         warnings.push_back(file.path().string() +
                            ": COPC's octree is not used; with fields added it is written as plain LAZ.");
     return shape;
+}
+
+LasScale las_scale(const CloudRecords& records, std::string_view name) {
+    constexpr std::uint8_t has_factor = 8, has_offset = 16; // table 24
+    LasScale found;
+    for (const Vlr& vlr : vlrs_of(records))
+        for (std::size_t at = 0; names_extra_bytes(vlr) && at + descriptor_size <= vlr.data.size();
+             at += descriptor_size) {
+            const auto type = read_at<std::uint8_t>(vlr.data, at + 2),
+                       options = read_at<std::uint8_t>(vlr.data, at + 3);
+            if (type == 0 || fixed_text(vlr.data, at + 4, 32) != name)
+                continue; // of raw bytes, the options are their number
+            if ((options & has_factor) != 0)
+                found.factor = read_at<double>(vlr.data, at + 112);
+            if ((options & has_offset) != 0)
+                found.offset = read_at<double>(vlr.data, at + 136);
+        }
+    return found;
 }
 
 namespace {

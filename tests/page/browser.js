@@ -15,8 +15,9 @@ const expect = (held, words) => { if (!held) throw new Wrong(words); };
 
 /** Serves folders by path; nothing else listens. */
 const serve = () => new Promise((resolve) => {
-  const types = { ".html": "text/html", ".js": "text/javascript", ".png": "image/png" };
+  const types = { ".html": "text/html", ".js": "text/javascript", ".png": "image/png", ".svg": "image/svg+xml" };
   const server = http.createServer((request, response) => {
+    if (request.url === "/favicon.ico") return void response.writeHead(204).end(); // browsers ask for it where a file is an SVG
     const file = decodeURIComponent(request.url.split(/[?#]/)[0]);
     fs.readFile(file, (failure, bytes) => {
       response.writeHead(failure ? 404 : 200, { "content-type": types[path.extname(file)] || "application/octet-stream" });
@@ -65,15 +66,18 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
   };
   /** Of two pictures: the mean difference of channels (0 .. 255), and the share of pixels of the first that are not background. */
   const difference = (a, b) => decoder.evaluate(async (both) => {
-    const [one, other] = await Promise.all(both.map(async (base64) => {
+    const images = await Promise.all(both.map(async (base64) => {
       const image = new Image();
       image.src = "data:image/png;base64," + base64;
       await image.decode();
-      const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
-      context.drawImage(image, 0, 0);
-      return context.getImageData(0, 0, image.width, image.height).data;
+      return image;
     }));
-    if (one.length !== other.length) return { mean: 255, covered: 0 };
+    const { width, height } = images[0]; // that of the other one may be a pixel more
+    const [one, other] = images.map((image) => {
+      const context = new OffscreenCanvas(width, height).getContext("2d");
+      context.drawImage(image, 0, 0, width, height);
+      return context.getImageData(0, 0, width, height).data;
+    });
     let sum = 0, covered = 0;
     for (let i = 0; i < one.length; i += 4) {
       for (let channel = 0; channel < 3; ++channel) sum += Math.abs(one[i + channel] - other[i + channel]);
@@ -106,12 +110,15 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     for (const page of pages) await page.context().close().catch(() => {});
   };
 
-  const { run, cloud, hostile, comparison, list, large, bench, old } = spec.pages;
+  const { run, cloud, hostile, comparison, list, large, bench, camera, old } = spec.pages;
+  const is_document = (file) => file === bench || file === camera || file.endsWith(".svg"); // without scripts
+  const plots = fs.readdirSync(path.dirname(bench)).filter((name) => name.endsWith(".svg")).map((name) => path.join(path.dirname(bench), name));
+  const every = [...Object.values(spec.pages), ...Object.values(spec.tiles), ...plots].filter((file) => file !== large); // that one has no images
 
   for (const scheme of ["file", "http"])
     await check(`quiet over ${scheme}`, async (open_page) => {
-      for (const file of [run, cloud, comparison, list, bench]) {
-        const page = await open_page(file, { scheme, wait: file !== bench });
+      for (const file of every) {
+        const page = await open_page(file, { scheme, wait: !is_document(file) });
         await page.waitForTimeout(300);
         if (file === run || file === cloud) {
           await page.click("#show-points");
@@ -287,7 +294,7 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     // The view from the frame's own camera is its image: a pixel's colour is that of the picture.
     await points_of(page);
     await page.selectOption("#point-source", "frame 0");
-    await page.selectOption("#point-colour", "colour");
+    await slide(page, "#point-strength", 0);
     await page.locator("#point-edl").uncheck();
     await page.waitForTimeout(500);
     const drawn = await pixel(page, "#point-stage", 0.5, 0.5);
@@ -382,6 +389,130 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     }
   });
 
+  /** Where a place (in the file's coordinates) is on the canvas, as shares, in the view shown. */
+  const in_view = (page, place) => page.evaluate((p) => {
+    const camera = scanshade.shown_camera(), canvas = document.querySelector("#point-canvas");
+    const along = (axis) => axis.reduce((sum, value, i) => sum + value * (p[i] - camera.eye[i]), 0), z = along(camera.forward);
+    return [0.5 + along(camera.right) / z / (2 * camera.half_height) * canvas.clientHeight / canvas.clientWidth, 0.5 + along(camera.down) / z / (2 * camera.half_height)];
+  }, place);
+  const drawn = async (page) => { await page.waitForTimeout(400); return page.locator("#point-canvas").screenshot(); };
+  const click_at = async (page, place) => {
+    const [x, y] = await in_view(page, place), box = await page.locator("#point-canvas").boundingBox();
+    await page.mouse.click(box.x + x * box.width, box.y + y * box.height);
+    await page.waitForTimeout(300);
+    return Object.fromEntries(await page.$$eval("#picked-values tr", (lines) => lines.map((line) => [...line.children].map((cell) => cell.textContent))));
+  };
+  const roof = [10, 10, 4], ground = [3, 4, 0];
+
+  await check("a cloud's page", async (open_page) => {
+    const page = await open_page(spec.tiles.origin);
+    await points_of(page);
+    expect(await page.locator("#frame-view").isHidden(), "it does not open at the points");
+    expect((await page.textContent(".chip.all")) === "12,000 points", await page.textContent(".chip.all"));
+    for (const id of ["list", "strip", "previous", "range"]) expect(await page.locator(`#${id}`).isHidden(), `${id} of a cloud alone`);
+    expect(await page.locator("#beside img").evaluate((image) => image.complete && image.naturalWidth > 0), "no pictures beside");
+    const { covered } = await difference(...Array(2).fill(await drawn(page)));
+    expect(covered > 0.3, `${covered} of the picture is covered`);
+    // Tight, and all in it: corners of the ground are near the picture's edge, none is outside.
+    const corners = await Promise.all([[0, 0, 0], [20, 0, 0], [0, 20, 0], [20, 20, 0]].map((place) => in_view(page, place)));
+    expect(corners.flat().every((share) => share > -0.02 && share < 1.02), `outside: ${corners.join(" ")}`);
+    const least = Math.min(...corners.flat().map((share) => Math.min(share, 1 - share)));
+    expect(least < 0.08, `${least} of the picture is free`);
+    await page.click("#show-frame");
+    for (const id of ["left", "right", "strength", "divider"]) expect(await page.locator(`#${id}`).isHidden(), `${id} of one picture`);
+  });
+
+  await check("colourings", async (open_page) => {
+    const page = await open_page(spec.tiles.utm);
+    await points_of(page);
+    await page.locator("#point-edl").uncheck();
+    await page.locator("#point-backs").check(); // nothing says on which side of a roof without walls the air is
+    const offered = await page.$$eval("#point-colour option", (options) => options.map((option) => option.value));
+    for (const key of ["colour", "ao", "height", "field intensity", "field classification", "field return", "field returns", "field gps_time"]) expect(offered.includes(key), `${key} is not among ${offered}`);
+    const pictures = [];
+    for (const key of ["colour", "ao", "height", "field intensity", "field classification", "field return", "field gps_time"]) {
+      await page.selectOption("#point-colour", key);
+      pictures.push(await drawn(page));
+      for (const before of pictures.slice(0, -1)) expect((await difference(before, pictures[pictures.length - 1])).mean > 2, `${key} looks like another one`);
+    }
+    await page.selectOption("#point-colour", "height");
+    const range = await page.$$eval("#range input", (ends) => ends.map((end) => Number(end.value)));
+    expect(Math.abs(range[0] - spec.utm[2]) < 0.1 && range[1] > spec.utm[2] + 3.9 && range[1] < spec.utm[2] + 5.1, `heights of ${range}`);
+    const wide = await drawn(page);
+    await page.fill("#range-high", String(range[0] + 50));
+    expect((await difference(wide, await drawn(page))).mean > 1, "the range changes nothing");
+    await page.selectOption("#point-colour", "field classification");
+    await slide(page, "#point-strength", 0);
+    const legend = await page.$$eval("#class-legend li", (lines) => lines.map((line) => line.textContent));
+    for (const [i, words] of ["2 ground", "5 high vegetation 25.0 %", "6 building"].entries()) expect(legend[i]?.startsWith(words), `${words} for ${legend}`);
+    await page.waitForTimeout(400);
+    const shown = await pixel(page, "#point-canvas", ...(await in_view(page, roof.map((value, axis) => value + spec.utm[axis]))));
+    expect(apart(shown, [222, 82, 60]) < 4, `a roof in ${shown}`);
+    await slide(page, "#point-strength", 1);
+    expect((await difference(await drawn(page), pictures[4])).mean < 1, "classes are shaded by AO at first");
+    expect(page.complaints.length === 0, page.complaints.join());
+  });
+
+  await check("picked points", async (open_page) => {
+    const page = await open_page(spec.tiles.utm);
+    await points_of(page);
+    await page.locator("#point-backs").check();
+    const first = await click_at(page, roof.map((value, axis) => value + spec.utm[axis]));
+    expect(first.classification === "6 building" && first.return === "1" && first.returns === "1", JSON.stringify(first));
+    expect(Math.abs(Number(first.z) - spec.utm[2] - 4) < 0.001, `z ${first.z}`);
+    expect(Math.abs(Number(first.x) - spec.utm[0] - Number(first.intensity) / 1000) < 0.001, `x ${first.x}, millimetres ${first.intensity}`);
+    expect(!("distance" in first), "a distance from one point");
+    const second = await click_at(page, ground.map((value, axis) => value + spec.utm[axis]));
+    expect(second.classification === "2 ground", JSON.stringify(second));
+    const apart_m = Math.hypot(...["x", "y", "z"].map((axis) => second[axis] - first[axis]));
+    expect(Math.abs(Number(second.distance) - apart_m) < 0.001 && apart_m > 5, `${second.distance} for ${apart_m}`);
+    expect((await page.$$eval("#point-marks circle", (marks) => marks.length)) === 2, "no marks");
+    await page.keyboard.press("Escape");
+    expect(await page.locator("#picked").isHidden(), "Escape clears nothing");
+  });
+
+  await check("clipping box", async (open_page) => {
+    const page = await open_page(spec.tiles.origin);
+    await points_of(page);
+    const { covered } = await difference(...Array(2).fill(await drawn(page)));
+    await page.click("#clip summary");
+    await slide(page, "[aria-label='x to']", 0.5);
+    const half = await difference(...Array(2).fill(await drawn(page)));
+    expect(half.covered < 0.7 * covered && half.covered > 0.3 * covered, `${half.covered} of ${covered}`);
+    const right = await in_view(page, [15, 5, 0]), left = await in_view(page, [4, 10, 0]);
+    expect(apart(await pixel(page, "#point-canvas", ...right), background) < 20, "what is clipped is drawn");
+    expect(apart(await pixel(page, "#point-canvas", ...left), background) > 20, "what is in the box is gone");
+    expect(!Object.keys(await click_at(page, [15, 5, 0])).length, "a clipped point was picked");
+  });
+
+  await check("PNG", async (open_page) => {
+    const page = await open_page(spec.tiles.origin);
+    await points_of(page);
+    const shot = await drawn(page);
+    const [download] = await Promise.all([page.waitForEvent("download", { timeout: 10000 }), page.click("#point-png")]);
+    expect(download.suggestedFilename() === "tile.png", download.suggestedFilename());
+    const { mean, covered } = await difference(shot, fs.readFileSync(await download.path()));
+    expect(mean < 3 && covered > 0.2, `the picture differs by ${mean}`);
+    expect(page.complaints.length === 0, page.complaints.join());
+  });
+
+  await check("view in the link", async (open_page) => {
+    const page = await open_page(spec.tiles.utm);
+    await points_of(page);
+    await page.selectOption("#point-colour", "height");
+    await page.fill("#range-high", String(spec.utm[2] + 10));
+    await slide(page, "[aria-label='y from']", 0.25);
+    await page.focus("#point-canvas");
+    for (const key of ["ArrowLeft", "ArrowUp", "+"]) await page.keyboard.press(key);
+    const shot = await drawn(page);
+    await page.waitForTimeout(500);
+    const again = await open_page(spec.tiles.utm, { hash: new URL(page.url()).hash });
+    await points_of(again);
+    expect((await again.inputValue("#point-colour")) === "height", await again.inputValue("#point-colour"));
+    const { mean } = await difference(shot, await drawn(again));
+    expect(mean < 1, `the view differs by ${mean} after ${page.url()}`);
+  });
+
   await check("without WebGL", async (open_page) => {
     const page = await open_page(run, { before: () => {
       const real = HTMLCanvasElement.prototype.getContext;
@@ -417,8 +548,8 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
   // Were a name to become markup after all, the page's policy is the second lock.
   for (const scheme of ["file", "http"])
     await check(`policy over ${scheme}`, async (open_page) => {
-      for (const file of [run, comparison, list, bench]) {
-        const page = await open_page(file, { scheme, wait: file !== bench });
+      for (const file of [run, comparison, list, bench, camera]) {
+        const page = await open_page(file, { scheme, wait: !is_document(file) });
         await page.evaluate(async () => {
           const script = document.createElement("script");
           script.textContent = "window.hit = 'a script'";
@@ -483,8 +614,17 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     const page = await open_page(list);
     const first = await page.getAttribute("#rows tbody tr[data-row] a", "href");
     await page.click("#rows tbody tr[data-row] a");
-    await page.waitForSelector("html[data-ready] #stage");
+    await page.waitForSelector("html[data-ready] #viewer");
     expect(page.url().includes("/list/" + first), page.url());
+  });
+
+  await check("whole sentences", async (open_page) => {
+    for (const file of [hostile, list, cloud])
+      for (const width of [1440, 390]) {
+        const page = await open_page(file, { width });
+        const cut = await page.$$eval("#rows td, #frame-name, #lead, #about p, #notes li, #reason-list li", (all) => all.filter((each) => each.offsetParent && each.scrollWidth > each.clientWidth + 1).map((each) => each.textContent));
+        expect(cut.length === 0, `${file}, ${width}: ${cut.join(" | ")}`);
+      }
   });
 
   await check("older results", async (open_page) => {
@@ -511,8 +651,8 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
   });
 
   await check("narrow screens", async (open_page) => {
-    for (const file of [run, cloud, comparison, list, bench]) {
-      const page = await open_page(file, { width: 360, height: 740, wait: file !== bench });
+    for (const file of [run, cloud, comparison, list, bench, camera]) {
+      const page = await open_page(file, { width: 360, height: 740, wait: !is_document(file) });
       await page.waitForTimeout(200);
       const wide = await page.evaluate(() => document.scrollingElement.scrollWidth - innerWidth);
       expect(wide <= 0, `${file} is ${wide} px too wide`);
@@ -523,7 +663,7 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     const { HtmlValidate } = module_of("html-validate");
     const validator = new HtmlValidate({ extends: ["html-validate:recommended"], rules: { "no-inline-style": "off", "long-title": "off", "require-sri": "off", "no-trailing-whitespace": "off" } });
     const amiss = [];
-    for (const file of [run, hostile, list, comparison, bench]) {
+    for (const file of [run, hostile, list, comparison, bench, camera]) {
       const report = await validator.validateString(fs.readFileSync(file, "utf8"), file);
       amiss.push(...report.results.flatMap((each) => each.messages.map((message) => `${file}:${message.line}: ${message.ruleId}: ${message.message}`)).slice(0, 10));
     }
@@ -533,9 +673,9 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
   await check("accessible", async (open_page) => {
     const amiss = [];
     const axe = fs.readFileSync(path.join(spec.modules, "axe-core", "axe.min.js"), "utf8");
-    for (const file of [run, cloud, hostile, comparison, list, bench])
+    for (const file of [run, cloud, hostile, comparison, list, bench, camera])
       for (const dark of [false, true]) {
-        const page = await open_page(file, { dark, wait: file !== bench });
+        const page = await open_page(file, { dark, wait: !is_document(file) });
         await page.waitForTimeout(300);
         for (const view of file === run ? ["frame", "points"] : [""]) {
           if (view === "points") await page.click("#show-points");

@@ -135,6 +135,8 @@ class BrowserTest : public testing::Test {
             throw std::runtime_error("--page no wrote a page");
         must(fmt::format("view '{}/old'", home.string()));
         must(fmt::format("bench '{0}/office' -o '{0}/bench' --methods cacao --frames 1 --rounds 1", home.string()));
+        must(fmt::format("refine '{0}/office' -o '{0}/camera.json' --report '{0}/camera.html'", home.string()));
+        spec["pages"]["camera"] = home / "camera.html";
         write_large_page(home / "large");
         for (const char* page : {"run", "cloud", "hostile", "list", "bench", "large", "old"})
             spec["pages"][page] = home / page / "index.html";
@@ -259,6 +261,18 @@ TEST_F(BrowserTest, each_chunk_of_a_cloud_is_an_even_sample_and_strays_are_count
 }
 TEST_F(BrowserTest, map_coordinates_are_drawn_as_those_round_the_origin) { EXPECT_EQ(found("map coordinates"), ""); }
 TEST_F(BrowserTest, tiles_of_a_capture_lie_side_by_side) { EXPECT_EQ(found("tiles"), ""); }
+TEST_F(BrowserTest, a_clouds_page_opens_at_its_points_with_the_pictures_beside) {
+    EXPECT_EQ(found("a cloud's page"), "");
+}
+TEST_F(BrowserTest, points_take_the_colour_of_any_number_with_its_range_or_classes) {
+    EXPECT_EQ(found("colourings"), "");
+}
+TEST_F(BrowserTest, a_picked_point_tells_its_values_and_the_distance_to_the_one_before) {
+    EXPECT_EQ(found("picked points"), "");
+}
+TEST_F(BrowserTest, the_clipping_box_hides_what_is_outside) { EXPECT_EQ(found("clipping box"), ""); }
+TEST_F(BrowserTest, the_button_saves_the_picture_of_the_points) { EXPECT_EQ(found("PNG"), ""); }
+TEST_F(BrowserTest, a_link_shows_the_same_view) { EXPECT_EQ(found("view in the link"), ""); }
 TEST_F(BrowserTest, without_webgl_the_page_says_so_and_the_rest_works) { EXPECT_EQ(found("without WebGL"), ""); }
 TEST_F(BrowserTest, hostile_names_are_shown_and_never_run) { EXPECT_EQ(found("hostile names"), ""); }
 TEST_F(BrowserTest, what_gets_into_a_page_is_neither_run_nor_loaded) {
@@ -268,6 +282,7 @@ TEST_F(BrowserTest, what_gets_into_a_page_is_neither_run_nor_loaded) {
 TEST_F(BrowserTest, ten_thousand_rows_scroll_sort_and_plot) { EXPECT_EQ(found("ten thousand rows"), ""); }
 TEST_F(BrowserTest, a_comparison_has_errors_worst_first_and_difference_pictures) { EXPECT_EQ(found("comparison"), ""); }
 TEST_F(BrowserTest, a_list_leads_to_the_pages_of_its_captures) { EXPECT_EQ(found("list"), ""); }
+TEST_F(BrowserTest, sentences_are_not_cut) { EXPECT_EQ(found("whole sentences"), ""); }
 TEST_F(BrowserTest, results_without_previews_show_their_images) { EXPECT_EQ(found("older results"), ""); }
 TEST_F(BrowserTest, missing_files_are_named) { EXPECT_EQ(found("missing files"), ""); }
 TEST_F(BrowserTest, pages_fit_a_phone) { EXPECT_EQ(found("narrow screens"), ""); }

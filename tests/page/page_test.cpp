@@ -7,14 +7,20 @@
 #include "apps/page/text.h"
 #include "apps/results/captures_page.h"
 #include "io/captures/capture.h"
+#include "io/clouds/cloud_file.h"
+#include "io/clouds/number_fields.h"
 #include "tests/support/files.h"
 #include "tests/support/points.h"
 #include "tests/support/says.h"
 #include "tests/support/small_capture.h"
+#include "tests/support/tile.h"
 
+#include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 
 namespace scanshade {
@@ -104,6 +110,97 @@ TEST(PagePointsTest, clouds_without_extent_or_points_are_no_error) {
     }
 }
 
+/// What a script of points holds.
+nlohmann::json chunk_in(const fs::path& file) {
+    const std::string text = read_bytes(file), call = "scanshade.points(";
+    EXPECT_TRUE(text.starts_with(call) && text.ends_with(")\n"));
+    return nlohmann::json::parse(text.substr(call.size(), text.size() - call.size() - 2));
+}
+
+TEST(PagePointsTest, fields_have_steps_that_keep_integers_and_names_that_end_no_script) {
+    const TemporaryFolder folder;
+    const auto points = tests::corner(1000);
+    const auto read = [](std::size_t i, std::span<double> values) {
+        values[0] = static_cast<double>(i % 7);
+        values[1] = i == 3 ? std::numeric_limits<double>::quiet_NaN() : 1e9 + static_cast<double>(i);
+        values[2] = 4;
+        values[3] = std::numeric_limits<double>::quiet_NaN();
+        values[4] = static_cast<double>(i) * 1000;
+    };
+    (void)page::write_points(
+        folder.path(), "a",
+        {.points = points,
+         .fields = {{"</script><b>", true}, {"time", false}, {"constant", true}, {"nothing", false}, {"wide", true}},
+         .read = read},
+        10000);
+    EXPECT_EQ(read_bytes(folder / "a.000.js").find('<'), std::string::npos);
+    const auto chunk = chunk_in(folder / "a.000.js");
+    const auto fields = chunk["fields"], codes = chunk["codes"];
+    ASSERT_EQ(fields.size(), 4u) << "a field without any value is left out";
+    ASSERT_EQ(codes.size(), 4u);
+    EXPECT_EQ(fields[0],
+              nlohmann::json({{"name", "</script><b>"}, {"low", 0}, {"high", 6}, {"step", 1}, {"whole", true}}));
+    EXPECT_NEAR(fields[1]["step"].get<double>(), 999.0 / 65534, 1e-9);
+    EXPECT_EQ(codes[2], "") << "a constant needs no codes";
+    EXPECT_GT(fields[3]["step"].get<double>(), 1) << "integers of a wide range are rounded";
+    EXPECT_EQ(fields[3]["name"], "wide");
+}
+
+TEST(PagePointsTest, more_fields_than_are_shown_are_counted) {
+    const TemporaryFolder folder;
+    const auto points = tests::corner(10);
+    const std::vector<page::Field> fields(page::most_fields + 5, {"f", true});
+    (void)page::write_points(
+        folder.path(), "a",
+        {.points = points,
+         .fields = fields,
+         .read = [](std::size_t i, std::span<double> values) { std::ranges::fill(values, static_cast<double>(i)); }},
+        10000);
+    const auto chunk = chunk_in(folder / "a.000.js");
+    EXPECT_EQ(chunk["fields"].size(), page::most_fields);
+    EXPECT_EQ(chunk["more_fields"], 5);
+}
+
+/// The numbers of a point by their names.
+std::map<std::string, double> numbers_of(const Cloud& cloud, std::size_t point) {
+    const auto fields = number_fields(*cloud.records);
+    std::vector<double> values(fields.size());
+    read_numbers(*cloud.records, fields, point, values);
+    std::map<std::string, double> named;
+    for (std::size_t i = 0; i < fields.size(); ++i)
+        named[fields[i].name] = values[i];
+    return named;
+}
+
+TEST(NumberFieldsTest, bits_of_las_are_taken_apart_and_extra_fields_scaled) {
+    const TemporaryFolder folder;
+    std::vector<std::string> warnings;
+    const Cloud cloud = read_cloud(tests::write_file(folder / "a.las", tests::tile({0, 0, 0})), warnings);
+    const std::map<std::string, double> tree = {{"intensity", std::round(1000 * cloud.points[7].x())},
+                                                {"return", 2},
+                                                {"returns", 3},
+                                                {"scanner_channel", 0},
+                                                {"classification", 5},
+                                                {"user_data", 0},
+                                                {"scan_angle", 0},
+                                                {"point_source_id", 0},
+                                                {"gps_time", 300000 + 0.007}};
+    EXPECT_EQ(numbers_of(cloud, 7), tree);
+    // An extra field: 32 bits without a sign, whose value is a tenth of what is stored, plus 5.
+    std::string description(192, '\0'), file = tests::las_file(6, 34, std::string(34, '\0'));
+    description[2] = 5, description[3] = 8 | 16;
+    std::string_view("height").copy(description.data() + 4, 32);
+    tests::store(description.data() + 112, 0.1);
+    tests::store(description.data() + 136, 5.0);
+    tests::store(file.data() + 375 + 30, std::uint32_t(120));
+    const std::string record = tests::vlr("LASF_Spec", 4, description);
+    tests::store(file.data() + 96, static_cast<std::uint32_t>(375 + record.size()));
+    tests::store(file.data() + 100, 1U);
+    file.insert(375, record);
+    const auto numbers = numbers_of(read_cloud(tests::write_file(folder / "b.las", file), warnings), 0);
+    EXPECT_DOUBLE_EQ(numbers.at("height"), 17);
+}
+
 // ---------------------------------------------------------------------------------------------------- files of a run
 
 class PageFilesTest : public testing::Test {
@@ -165,7 +262,7 @@ TEST_F(PageFilesTest, a_page_runs_its_own_scripts_and_those_of_its_folder_only) 
     EXPECT_TRUE(says(policy, "default-src 'none'"));
     EXPECT_FALSE(says(policy, "unsafe"));
     const auto scripts = between(html, "script"), styles = between(html, "style");
-    EXPECT_EQ(scripts.size(), 9u);
+    EXPECT_EQ(scripts.size(), 17u);
     EXPECT_EQ(styles.size(), 1u);
     std::size_t hashes = 0;
     for (std::size_t each = policy.find("'sha256-"); each != std::string::npos;
