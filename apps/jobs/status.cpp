@@ -204,7 +204,8 @@ class Pages {
     /// Tasks in their order: the blocks of a capture follow each other.
     void add(const Task& task, const Reading& reading) {
         const fs::path folder = results_of(job_, task);
-        captures_.take(captures_.add(task.name, folder, reading.frames), reading.rows);
+        captures_.take(captures_.add(task.name, folder, reading.frames, {task.capture.string(), reading.stored.in}),
+                       reading.rows);
         const std::string block = task.block();
         if (block.empty()) // a whole capture, whose run has written its page
             return;
@@ -218,12 +219,8 @@ class Pages {
         std::vector<std::string> notes;
         for (const std::string& refused : plan.refused)
             notes.push_back("refused when the job was planned: " + refused);
-        std::vector<page::ListReason> reasons;
-        for (const auto& [kind, groups] : {std::pair("failed", &totals.reasons), std::pair("doubtful", &totals.doubts)})
-            for (const auto& [reason, group] : most_frequent_first(*groups))
-                reasons.push_back({kind, group.frames, reason, group.example});
         captures_.write(fmt::format("{} tasks, {} of {} frames done", totals.tasks, settled(totals), totals.frames),
-                        std::move(notes), std::move(reasons));
+                        std::move(notes));
     }
 
   private:

@@ -35,7 +35,8 @@ void write_list(const std::filesystem::path& folder, const ListPage& list) {
                            known_or_null(row.coverage),
                            known_or_null(row.visibility),
                            known_or_null(row.ms),
-                           row.page};
+                           row.page,
+                           row.picture};
         lines += (lines.empty() ? "" : ",\n") + for_script(json_line(line));
     }
     json facts = json::array();

@@ -15,7 +15,8 @@ struct ListRow {
     std::string name;
     std::size_t frames = 0, ok = 0, doubtful = 0, failed = 0, left = 0;
     double coverage = 0, visibility = 0, ms = 0;
-    std::string page = {}; ///< "office/index.html", from the list's folder; empty = it has none
+    std::string page = {};    ///< "office/index.html", from the list's folder; empty = it has none
+    std::string picture = {}; ///< of a frame that stands for it, "office/shaded/000.png"; likewise
 };
 
 /// Frames that share a reason.

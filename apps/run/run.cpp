@@ -60,7 +60,8 @@ class Run final : public Command {
         std::mutex counting;
         CapturesPage page(asked_.out);
         for (const CaptureJob& job : jobs)
-            page.add(job.folder().filename().string(), job.folder(), job.batch.frames.size());
+            page.add(job.folder().filename().string(), job.folder(), job.batch.frames.size(),
+                     {job.capture.path.string()});
         overlapped(jobs.size(), captures_.at_once(), [&](std::size_t i, OrderedOutput& output) {
             if (interrupted)
                 return;

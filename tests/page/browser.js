@@ -612,14 +612,31 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
 
   await check("list", async (open_page) => {
     const page = await open_page(list);
+    expect((await names(page)).join() === "lost,corner,office", `not worst first: ${await names(page)}`);
+    const pictures = await page.$$eval("#rows td.picture img", (images) => Promise.all(images.map((image) => image.decode().then(() => image.naturalWidth))));
+    expect(pictures.length === 2 && pictures.every((width) => width > 0), `pictures of the two that have one: ${pictures}`);
+    const reasons = await page.$$eval("#reason-list li", (lines) => lines.map((line) => line.textContent));
+    expect(reasons.length === 2 && reasons[0].startsWith("1 × failed") && reasons[0].includes("no camera") && reasons[1].startsWith("1 × doubtful"), reasons.join(" | "));
+    await page.click(".chip.failed");
+    expect((await names(page)).join() === "lost", `failed: ${await names(page)}`);
+    await page.click(".chip.all");
+    await page.fill("#filter", "orn");
+    expect((await names(page)).join() === "corner", `filtered: ${await names(page)}`);
     const first = await page.getAttribute("#rows tbody tr[data-row] a", "href");
     await page.click("#rows tbody tr[data-row] a");
     await page.waitForSelector("html[data-ready] #viewer");
     expect(page.url().includes("/list/" + first), page.url());
   });
 
+  await check("failed run", async (open_page) => {
+    const page = await open_page(spec.pages.failed);
+    const lead = await page.textContent("#lead");
+    for (const words of ["1 of 1 failed: the depth image has no camera", "give --camera FILE or --camera fx,fy,cx,cy", "--resume --retry"]) expect(lead.includes(words), `${words}: ${lead}`);
+    expect((await page.textContent("#details")).includes("lost.png"), "no command line to run again");
+  });
+
   await check("whole sentences", async (open_page) => {
-    for (const file of [hostile, list, cloud])
+    for (const file of [hostile, spec.pages.failed, list, cloud])
       for (const width of [1440, 390]) {
         const page = await open_page(file, { width });
         const cut = await page.$$eval("#rows td, #frame-name, #lead, #about p, #notes li, #reason-list li", (all) => all.filter((each) => each.offsetParent && each.scrollWidth > each.clientWidth + 1).map((each) => each.textContent));

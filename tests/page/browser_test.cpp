@@ -129,7 +129,10 @@ class BrowserTest : public testing::Test {
         spec["cloud_box"] = {{0, 0, 0}, {2, 2, 2}};
         add_tiles(spec, home);
         add_hostile(spec, home);
-        must(fmt::format("run '{0}/office' '{0}/corner.ply' -o '{0}/list' --frames 0:1", home.string()));
+        fs::copy_file(fs::directory_iterator(home / "office/depth")->path(), home / "lost.png"); // it has no camera
+        must(fmt::format("run '{0}/office' '{0}/corner.ply' '{0}/lost.png' -o '{0}/list' --frames 0:1", home.string()),
+             2);
+        spec["pages"]["failed"] = home / "list/lost/index.html";
         must(fmt::format("run '{0}/office' -o '{0}/old' --page no --frames 0:2", home.string()));
         if (fs::exists(home / "old/index.html") || fs::exists(home / "old/previews"))
             throw std::runtime_error("--page no wrote a page");
@@ -281,7 +284,10 @@ TEST_F(BrowserTest, what_gets_into_a_page_is_neither_run_nor_loaded) {
 }
 TEST_F(BrowserTest, ten_thousand_rows_scroll_sort_and_plot) { EXPECT_EQ(found("ten thousand rows"), ""); }
 TEST_F(BrowserTest, a_comparison_has_errors_worst_first_and_difference_pictures) { EXPECT_EQ(found("comparison"), ""); }
-TEST_F(BrowserTest, a_list_leads_to_the_pages_of_its_captures) { EXPECT_EQ(found("list"), ""); }
+TEST_F(BrowserTest, a_list_has_pictures_worst_first_and_leads_to_the_pages_of_its_captures) {
+    EXPECT_EQ(found("list"), "");
+}
+TEST_F(BrowserTest, the_page_of_a_failed_run_says_what_to_do) { EXPECT_EQ(found("failed run"), ""); }
 TEST_F(BrowserTest, sentences_are_not_cut) { EXPECT_EQ(found("whole sentences"), ""); }
 TEST_F(BrowserTest, results_without_previews_show_their_images) { EXPECT_EQ(found("older results"), ""); }
 TEST_F(BrowserTest, missing_files_are_named) { EXPECT_EQ(found("missing files"), ""); }
