@@ -82,6 +82,8 @@
           if (facts.up) camera.up = facts.up;
           if (chunk.has.sides) facing = mean_normal(chunk);
           by_id("point-backs").parentElement.hidden = !chunk.has.sides;
+          // Rooms are opened, by their inner sides. What mostly faces one way, as terrain does, would only get holes.
+          by_id("point-backs").checked = Math.hypot(...facing) > 0.3;
           offered = colours.offer(chunk, camera.up.map((value) => value / Math.hypot(...camera.up)));
         } else offered = offered.then(() => (number === loading_number ? colours.take(chunk) : null)).then(draw);
         if (!keep_view && (chunks.length === 1 || next.key === "clouds")) home(false);
