@@ -1,9 +1,11 @@
 #include "io/rasters/crs.h"
 
 #include "io/rasters/well_known_text.h"
+#include "io/text.h"
 #include "projection/base/error.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <fmt/format.h>
 #include <iterator>
@@ -111,12 +113,14 @@ double plane_unit(const GeoKeys& keys) {
     return unit_of_code(units_of_projected, value_of(keys, projected_crs, 0));
 }
 
+constexpr std::string_view no_unit_named = "No unit of heights is named";
+
 /// The unit of heights follows that of the plane where no other is named.
 void take_plane_unit(Crs& crs) {
     crs.height_unit_m = crs.unit_m;
     if (crs.unit_m != 1)
-        crs.notes.push_back(fmt::format(
-            "No unit of heights is named: they are taken as in the unit of the coordinates, {} m.", crs.unit_m));
+        crs.notes.push_back(
+            fmt::format("{}: they are taken as in the unit of the coordinates, {} m.", no_unit_named, crs.unit_m));
 }
 
 } // namespace
@@ -203,6 +207,46 @@ Crs crs_of_text(std::string_view text) {
         keys = with_value(std::move(keys), vertical_crs, vertical_code);
     crs.keys = std::move(keys);
     return crs;
+}
+
+void take_height_unit(Crs& crs, const std::string& unit, std::vector<std::string>& notes) {
+    struct Word {
+        std::string_view word;
+        double metres;
+    };
+    static constexpr Word words[] = {
+        {"m", 1},
+        {"metre", 1},
+        {"meter", 1},
+        {"metres", 1},
+        {"meters", 1},
+        {"ft", 0.3048},
+        {"foot", 0.3048},
+        {"feet", 0.3048},
+        {"cm", 0.01},
+        {"mm", 0.001},
+        {"km", 1000},
+        {"us-ft", 1200.0 / 3937},
+        {"ftus", 1200.0 / 3937},
+        {"us survey foot", 1200.0 / 3937},
+        {"us survey feet", 1200.0 / 3937},
+    };
+    if (unit.empty())
+        return;
+    std::string lower = unit;
+    std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return std::tolower(c); });
+    const auto found = std::ranges::find(words, lower, &Word::word);
+    if (found == std::end(words)) {
+        notes.push_back(
+            fmt::format("The unit of heights, {}, is not known: {} m are taken.", in_quotes(unit), crs.height_unit_m));
+        return;
+    }
+    std::erase_if(notes, [](const std::string& note) { return note.starts_with(no_unit_named); });
+    if (std::abs(found->metres - crs.height_unit_m) > 1e-9)
+        notes.push_back(
+            fmt::format("Heights are in {} as the band says, {} m, not {} m as its coordinate system has it.", unit,
+                        found->metres, crs.height_unit_m));
+    crs.height_unit_m = found->metres;
 }
 
 } // namespace scanshade::rasters

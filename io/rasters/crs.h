@@ -32,6 +32,10 @@ struct Crs {
 /// From well-known text, version 1 or 2. Codes of EPSG become keys; without one the text is kept.
 [[nodiscard]] Crs crs_of_text(std::string_view text);
 
+/// A band's own unit of heights, as GDAL names it ("ft"), goes before that of the coordinate system; empty = none is
+/// named. What it changes, and words that are not known, become notes.
+void take_height_unit(Crs& crs, const std::string& unit, std::vector<std::string>& notes);
+
 /// A key's value; `otherwise` where it is not there. Values in other tags are not followed.
 [[nodiscard]] int value_of(const GeoKeys& keys, int key, int otherwise);
 /// The same keys, with a value of this one.

@@ -181,23 +181,55 @@ Grid grid_of(const TiffInput& tiff, cv::Size size, std::vector<std::string>& not
 /// How a band's numbers are stored.
 struct Layout {
     cv::Size size;
-    cv::Size piece; ///< of a tile, or of a strip
-    int bytes = 0;  ///< of a number
+    cv::Size piece; ///< of a tile, of a strip, or of a row of a strip
+    int bits = 0;   ///< of a number: 8 and more, or 1 of a mask
     int format = 0; ///< SAMPLEFORMAT_...
     int step = 1;   ///< numbers from one of a band to its next
     int first = 0;  ///< number of the first of the band
     int plane = 0;  ///< of separate planes
     bool tiled = false;
+    bool by_row = false; ///< strips are so long that they are read row by row
+
+    [[nodiscard]] int cell_bytes() const { return bits / 8 * step; }
+    [[nodiscard]] std::size_t row_bytes() const {
+        return (static_cast<std::size_t>(piece.width) * static_cast<std::size_t>(step * bits) + 7) / 8;
+    }
 };
+
+cv::Size size_of(const TiffInput& tiff) {
+    const std::uint32_t width = tiff.number(TIFFTAG_IMAGEWIDTH, 0), height = tiff.number(TIFFTAG_IMAGELENGTH, 0);
+    constexpr std::uint32_t most = 1 << 30;
+    if (width == 0 || height == 0 || width > most || height > most)
+        tiff.refuse(fmt::format("{} x {} cells, expected sides of 1 to {}", width, height, most));
+    return {static_cast<int>(width), static_cast<int>(height)};
+}
+
+void set_pieces(const TiffInput& tiff, Layout& layout) {
+    layout.tiled = TIFFIsTiled(tiff.get()) != 0;
+    const auto height = static_cast<std::uint32_t>(layout.size.height);
+    const std::uint32_t width =
+        layout.tiled ? tiff.number(TIFFTAG_TILEWIDTH, 0) : static_cast<std::uint32_t>(layout.size.width);
+    const std::uint32_t rows =
+        layout.tiled ? tiff.number(TIFFTAG_TILELENGTH, 0) : std::min(tiff.number(TIFFTAG_ROWSPERSTRIP, height), height);
+    layout.piece = {static_cast<int>(width), static_cast<int>(rows)};
+    const std::uint64_t expected = layout.row_bytes() * rows;
+    const tmsize_t stored = layout.tiled ? TIFFTileSize(tiff.get()) : TIFFStripSize(tiff.get());
+    if (width == 0 || rows == 0 || stored <= 0 || expected != static_cast<std::uint64_t>(stored))
+        tiff.refuse(fmt::format("{} of {}x{} cells that should have {} bytes have {}",
+                                layout.tiled ? "tiles" : "strips", width, rows, expected, stored));
+    constexpr std::uint64_t long_strip = 1 << 22; // bytes
+    layout.by_row = !layout.tiled && expected > long_strip;
+    if (layout.by_row)
+        layout.piece.height = 1;
+}
 
 Layout layout_of(const TiffInput& tiff, int band) {
     Layout layout;
-    layout.size =
-        image_check::checked_size(tiff.number(TIFFTAG_IMAGEWIDTH, 0), tiff.number(TIFFTAG_IMAGELENGTH, 0), tiff.file());
+    layout.size = size_of(tiff);
     const int bits = tiff.short_number(TIFFTAG_BITSPERSAMPLE, 1),
               samples = tiff.short_number(TIFFTAG_SAMPLESPERPIXEL, 1);
     layout.format = tiff.short_number(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
-    layout.bytes = bits / 8;
+    layout.bits = bits;
     const bool number = layout.format == SAMPLEFORMAT_IEEEFP
                             ? bits == 32 || bits == 64
                             : (layout.format == SAMPLEFORMAT_UINT || layout.format == SAMPLEFORMAT_INT) &&
@@ -215,18 +247,7 @@ Layout layout_of(const TiffInput& tiff, int band) {
     layout.step = separate ? 1 : samples;
     layout.first = separate ? 0 : index;
     layout.plane = separate ? index : 0;
-    layout.tiled = TIFFIsTiled(tiff.get()) != 0;
-    const std::uint32_t height = static_cast<std::uint32_t>(layout.size.height);
-    const std::uint32_t width =
-        layout.tiled ? tiff.number(TIFFTAG_TILEWIDTH, 0) : static_cast<std::uint32_t>(layout.size.width);
-    const std::uint32_t rows =
-        layout.tiled ? tiff.number(TIFFTAG_TILELENGTH, 0) : std::min(tiff.number(TIFFTAG_ROWSPERSTRIP, height), height);
-    const std::uint64_t expected = std::uint64_t(width) * rows * static_cast<std::uint64_t>(layout.bytes * layout.step);
-    const tmsize_t stored = layout.tiled ? TIFFTileSize(tiff.get()) : TIFFStripSize(tiff.get());
-    if (width == 0 || rows == 0 || stored <= 0 || expected != static_cast<std::uint64_t>(stored))
-        tiff.refuse(fmt::format("{} of {}x{} cells that should have {} bytes have {}",
-                                layout.tiled ? "tiles" : "strips", width, rows, expected, stored));
-    layout.piece = {static_cast<int>(width), static_cast<int>(rows)};
+    set_pieces(tiff, layout);
     return layout;
 }
 
@@ -245,45 +266,58 @@ NumberAt reader_of(const Layout& layout) {
     const std::array<NumberAt, 4> negative{&number_at<std::int8_t>, &number_at<std::int16_t>, &number_at<std::int32_t>,
                                            &number_at<std::int64_t>};
     if (layout.format == SAMPLEFORMAT_IEEEFP)
-        return layout.bytes == 4 ? &number_at<float> : &number_at<double>;
-    const std::size_t index = layout.bytes == 1 ? 0 : layout.bytes == 2 ? 1 : layout.bytes == 4 ? 2 : 3;
+        return layout.bits == 32 ? &number_at<float> : &number_at<double>;
+    const std::size_t index = layout.bits <= 8 ? 0 : layout.bits == 16 ? 1 : layout.bits == 32 ? 2 : 3;
     return layout.format == SAMPLEFORMAT_INT ? negative[index] : whole[index];
 }
 
-/// Calls take(row, column, number) for every cell of the band; pieces that were never written have none.
+/// Reads the piece with that cell; false where it was never written.
+bool read_piece(const TiffInput& tiff, const Layout& layout, int x, int y, std::string& piece) {
+    const auto column = static_cast<std::uint32_t>(x), row = static_cast<std::uint32_t>(y);
+    const auto plane = static_cast<std::uint16_t>(layout.plane);
+    const std::uint32_t index =
+        layout.tiled ? TIFFComputeTile(tiff.get(), column, row, 0, plane) : TIFFComputeStrip(tiff.get(), row, plane);
+    if (TIFFGetStrileByteCount(tiff.get(), index) == 0)
+        return false;
+    if (layout.by_row) {
+        if (TIFFReadScanline(tiff.get(), piece.data(), row, plane) != 1)
+            tiff.fail();
+        return true;
+    }
+    const auto rows = static_cast<std::size_t>(std::min(layout.piece.height, layout.size.height - y));
+    const auto size = static_cast<tmsize_t>(layout.tiled ? piece.size() : rows * layout.row_bytes());
+    if ((layout.tiled ? TIFFReadEncodedTile(tiff.get(), index, piece.data(), size)
+                      : TIFFReadEncodedStrip(tiff.get(), index, piece.data(), size)) != size)
+        tiff.fail();
+    return true;
+}
+
+/// Calls take(row, column, number) for cells of the band in rows first .. last - 1; pieces that were never written have
+/// none.
 template <class Take>
-void visit(const TiffInput& tiff, const Layout& layout, const Take& take) {
+void visit(const TiffInput& tiff, const Layout& layout, int first, int last, const Take& take) {
     const NumberAt read = reader_of(layout);
-    const int cell_bytes = layout.bytes * layout.step;
-    std::string piece(static_cast<std::size_t>(layout.piece.area()) * static_cast<std::size_t>(cell_bytes), '\0');
-    for (int y = 0; y < layout.size.height; y += layout.piece.height)
+    const int cell_bytes = layout.cell_bytes();
+    std::string piece(static_cast<std::size_t>(layout.piece.height) * layout.row_bytes(), '\0');
+    for (int y = first / layout.piece.height * layout.piece.height; y < last; y += layout.piece.height)
         for (int x = 0; x < layout.size.width; x += layout.piece.width) {
-            const auto column = static_cast<std::uint32_t>(x), row = static_cast<std::uint32_t>(y);
-            const auto plane = static_cast<std::uint16_t>(layout.plane);
-            const std::uint32_t index = layout.tiled ? TIFFComputeTile(tiff.get(), column, row, 0, plane)
-                                                     : TIFFComputeStrip(tiff.get(), row, plane);
-            if (TIFFGetStrileByteCount(tiff.get(), index) == 0)
+            if (!read_piece(tiff, layout, x, y, piece))
                 continue;
-            const int rows = std::min(layout.piece.height, layout.size.height - y);
-            const auto size = static_cast<tmsize_t>(layout.tiled ? piece.size()
-                                                                 : static_cast<std::size_t>(rows * layout.piece.width) *
-                                                                       static_cast<std::size_t>(cell_bytes));
-            if ((layout.tiled ? TIFFReadEncodedTile(tiff.get(), index, piece.data(), size)
-                              : TIFFReadEncodedStrip(tiff.get(), index, piece.data(), size)) != size)
-                tiff.fail();
             const int columns = std::min(layout.piece.width, layout.size.width - x);
-            for (int j = 0; j < rows; ++j) {
-                const char* at = piece.data() + static_cast<std::ptrdiff_t>(j) * layout.piece.width * cell_bytes +
-                                 layout.first * layout.bytes;
+            for (int row = std::max(y, first); row < std::min(y + layout.piece.height, last); ++row) {
+                const char* line = piece.data() + static_cast<std::size_t>(row - y) * layout.row_bytes();
+                const char* at = line + layout.first * (layout.bits / 8);
                 for (int i = 0; i < columns; ++i, at += cell_bytes)
-                    take(y + j, x + i, read(at));
+                    take(row, x + i,
+                         layout.bits == 1 ? static_cast<unsigned char>(line[i / 8]) >> (7 - i % 8) & 1 : read(at));
             }
         }
 }
 
-/// GDAL's metadata: SCALE, OFFSET.
+/// GDAL's metadata: SCALE, OFFSET, UNITTYPE.
 struct Scaling {
     double scale = 1, offset = 0;
+    std::string unit{};
     [[nodiscard]] bool any() const { return scale != 1 || offset != 0; }
 };
 
@@ -297,6 +331,8 @@ Scaling scaling_of(const TiffInput& tiff, int band) {
         if (item.attribute("sample").as_int() != std::max(band, 1) - 1)
             continue;
         const std::string_view role = item.attribute("role").value();
+        if (role == "unittype")
+            scaling.unit = trimmed(item.text().get());
         double* to = role == "scale" ? &scaling.scale : role == "offset" ? &scaling.offset : nullptr;
         if (!to)
             continue;
@@ -314,74 +350,132 @@ std::optional<double> nodata_of(const TiffInput& tiff, const Layout& layout) {
     const auto value = number(trimmed(text));
     if (!value)
         return std::nullopt;
-    const bool single = layout.format == SAMPLEFORMAT_IEEEFP && layout.bytes == 4;
+    const bool single = layout.format == SAMPLEFORMAT_IEEEFP && layout.bits == 32;
     return single ? static_cast<double>(static_cast<float>(*value)) : *value;
 }
 
 /// Whether single precision may lose digits of what the file holds.
 bool needs_base(const Layout& layout, const Scaling& scaling) {
-    return scaling.any() || layout.bytes == 8 || (layout.bytes == 4 && layout.format != SAMPLEFORMAT_IEEEFP);
+    return scaling.any() || layout.bits == 64 || (layout.bits == 32 && layout.format != SAMPLEFORMAT_IEEEFP);
 }
 
-void read_heights(const TiffInput& tiff, int band, Raster& raster) {
-    const Layout layout = layout_of(tiff, band);
-    require_memory(static_cast<std::uint64_t>(layout.size.area()) * sizeof(float), tiff.file().string());
-    const Scaling scaling = scaling_of(tiff, band);
-    const std::optional<double> nodata = nodata_of(tiff, layout);
-    constexpr double absurd = 1e30;
-    raster.z = cv::Mat1f(layout.size, std::nanf(""));
-    bool first = needs_base(layout, scaling);
-    visit(tiff, layout, [&](int row, int column, double value) {
-        if (nodata && value == *nodata)
-            return;
-        const double height = value * scaling.scale + scaling.offset;
-        if (!(std::abs(height) < absurd)) // NaN, too
-            return;
-        if (first)
-            raster.base = std::floor(height);
-        first = false;
-        raster.z(row, column) = static_cast<float>(height - raster.base);
-    });
+/// The directory of the image proper: neither an overview nor a mask.
+void find_image(TiffInput& tiff) {
+    while ((tiff.number(TIFFTAG_SUBFILETYPE, 0) & (reduced | mask)) != 0)
+        if (!tiff.next_directory())
+            tiff.refuse("no image but overviews and masks");
 }
 
-/// Cells that a mask leaves out have no data. It is of 1 or 8 bits.
-void apply_mask(const TiffInput& tiff, cv::Mat1f& z) {
-    const cv::Size size(static_cast<int>(tiff.number(TIFFTAG_IMAGEWIDTH, 0)),
-                        static_cast<int>(tiff.number(TIFFTAG_IMAGELENGTH, 0)));
-    const int bits = tiff.short_number(TIFFTAG_BITSPERSAMPLE, 1);
-    if (size != z.size() || (bits != 1 && bits != 8) || tiff.short_number(TIFFTAG_SAMPLESPERPIXEL, 1) != 1)
-        return;
-    if (bits == 8)
-        return visit(tiff, layout_of(tiff, 0), [&](int row, int column, double value) {
+/// A mask of 1 or 8 bits, behind the image: cells of 0 have no data.
+class Mask {
+  public:
+    /// In the file, or in GDAL's NAME.msk beside it. Null where there is none of that size.
+    static std::unique_ptr<Mask> find(const fs::path& file, cv::Size size) {
+        auto found = std::make_unique<Mask>(file);
+        find_image(found->tiff_);
+        while (found->tiff_.next_directory())
+            if ((found->tiff_.number(TIFFTAG_SUBFILETYPE, 0) & (reduced | mask)) == mask && found->fits(size))
+                return found;
+        const fs::path beside = file.string() + ".msk";
+        if (!is_tiff(beside))
+            return nullptr;
+        found = std::make_unique<Mask>(beside);
+        if (!found->fits(size))
+            found->tiff_.refuse(
+                fmt::format("expected a mask of one band of bytes, {}x{} cells", size.width, size.height));
+        return found;
+    }
+    explicit Mask(const fs::path& file) : tiff_(file) {}
+
+    void apply(int first, cv::Mat1f& z) const {
+        visit(tiff_, layout_, first, first + z.rows, [&](int row, int column, double value) {
             if (value == 0)
-                z(row, column) = std::nanf("");
+                z(row - first, column) = std::nanf("");
         });
-    const bool tiled = TIFFIsTiled(tiff.get()) != 0;
-    const auto width = static_cast<int>(tiled ? tiff.number(TIFFTAG_TILEWIDTH, 0) : tiff.number(TIFFTAG_IMAGEWIDTH, 0));
-    const auto rows = static_cast<int>(tiled ? tiff.number(TIFFTAG_TILELENGTH, 0)
-                                             : std::min<std::uint32_t>(tiff.number(TIFFTAG_ROWSPERSTRIP, UINT32_MAX),
-                                                                       static_cast<std::uint32_t>(size.height)));
-    const tmsize_t bytes = tiled ? TIFFTileSize(tiff.get()) : TIFFStripSize(tiff.get());
-    const int row_bytes = (width + 7) / 8;
-    if (width <= 0 || rows <= 0 || bytes < static_cast<tmsize_t>(row_bytes) * rows)
-        tiff.fail();
-    std::string piece(static_cast<std::size_t>(bytes), '\0');
-    for (int y = 0; y < size.height; y += rows)
-        for (int x = 0; x < size.width; x += width) {
-            const auto column = static_cast<std::uint32_t>(x), row = static_cast<std::uint32_t>(y);
-            const std::uint32_t index =
-                tiled ? TIFFComputeTile(tiff.get(), column, row, 0, 0) : TIFFComputeStrip(tiff.get(), row, 0);
-            if ((tiled ? TIFFReadEncodedTile(tiff.get(), index, piece.data(), bytes)
-                       : TIFFReadEncodedStrip(tiff.get(), index, piece.data(), bytes)) < 0)
-                tiff.fail();
-            for (int j = 0; j < std::min(rows, size.height - y); ++j)
-                for (int i = 0; i < std::min(width, size.width - x); ++i)
-                    if ((static_cast<unsigned char>(piece[static_cast<std::size_t>(j * row_bytes + i / 8)]) >>
-                             (7 - i % 8) &
-                         1) == 0)
-                        z(y + j, x + i) = std::nanf("");
+    }
+
+  private:
+    bool fits(cv::Size size) {
+        const int bits = tiff_.short_number(TIFFTAG_BITSPERSAMPLE, 1);
+        if (size_of(tiff_) != size || (bits != 1 && bits != 8) || tiff_.short_number(TIFFTAG_SAMPLESPERPIXEL, 1) != 1)
+            return false;
+        layout_.size = size, layout_.bits = bits, layout_.format = SAMPLEFORMAT_UINT;
+        set_pieces(tiff_, layout_);
+        return true;
+    }
+
+    TiffInput tiff_;
+    Layout layout_;
+};
+
+class TiffReader final : public RasterReader {
+  public:
+    TiffReader(const fs::path& file, int band) : tiff_(file) {
+        find_image(tiff_);
+        layout_ = layout_of(tiff_, band);
+        scaling_ = scaling_of(tiff_, band);
+        nodata_ = nodata_of(tiff_, layout_);
+        size = layout_.size;
+        grid = grid_of(tiff_, size, notes);
+        take_height_unit(grid.crs, scaling_.unit, notes);
+        scaled = scaling_.any();
+        mask_ = Mask::find(file, size);
+        if (needs_base(layout_, scaling_))
+            find_base();
+    }
+
+    void read(int first, cv::Mat1f& z) override {
+        for (int row = first; row < first + z.rows;) {
+            const int piece = row / layout_.piece.height * layout_.piece.height;
+            if (piece != decoded_first_)
+                decode(piece);
+            const int count = std::min(piece + decoded_.rows, first + z.rows) - row;
+            decoded_.rowRange(row - piece, row - piece + count).copyTo(z.rowRange(row - first, row - first + count));
+            row += count;
         }
-}
+    }
+
+  private:
+    /// NaN where there is no data.
+    [[nodiscard]] double height_of(double value) const {
+        constexpr double absurd = 1e30;
+        const double height = value * scaling_.scale + scaling_.offset;
+        return value == nodata_ || !(std::abs(height) < absurd) ? std::nan("") : height;
+    }
+
+    /// The whole number at or below the first height of the file.
+    void find_base() {
+        for (int row = 0, found = 0; row < size.height && found == 0; row += layout_.piece.height)
+            visit(tiff_, layout_, row, std::min(row + layout_.piece.height, size.height), [&](int, int, double value) {
+                const double height = height_of(value);
+                if (found == 0 && !std::isnan(height))
+                    base = std::floor(height), found = 1;
+            });
+    }
+
+    /// The rows of tiles, or of a strip, that begin there.
+    void decode(int first) {
+        const int last = std::min(first + layout_.piece.height, size.height);
+        require_memory(std::uint64_t(size.width) * static_cast<std::uint64_t>(last - first) * sizeof(float),
+                       tiff_.file().string());
+        decoded_first_ = -1; // until it is there
+        decoded_ = cv::Mat1f(last - first, size.width, std::nanf(""));
+        visit(tiff_, layout_, first, last, [&](int row, int column, double value) {
+            decoded_(row - first, column) = static_cast<float>(height_of(value) - base);
+        });
+        if (mask_)
+            mask_->apply(first, decoded_);
+        decoded_first_ = first;
+    }
+
+    TiffInput tiff_;
+    Layout layout_;
+    Scaling scaling_;
+    std::optional<double> nodata_;
+    std::unique_ptr<Mask> mask_;
+    cv::Mat1f decoded_;
+    int decoded_first_ = -1;
+};
 
 } // namespace
 
@@ -393,19 +487,20 @@ bool is_tiff(const fs::path& file) {
     return start == "II*\0"s || start == "MM\0*"s || start == "II+\0"s || start == "MM\0+"s;
 }
 
-Raster read_raster(const fs::path& file, int band) {
+std::unique_ptr<RasterReader> open_raster(const fs::path& file, int band) {
     if (is_vrt(file))
-        return read_vrt(file, band);
-    TiffInput tiff(file);
-    Raster raster;
-    while ((tiff.number(TIFFTAG_SUBFILETYPE, 0) & (reduced | mask)) != 0)
-        if (!tiff.next_directory())
-            tiff.refuse("no image but overviews and masks");
-    read_heights(tiff, band, raster);
-    raster.grid = grid_of(tiff, raster.z.size(), raster.notes);
-    while (tiff.next_directory())
-        if ((tiff.number(TIFFTAG_SUBFILETYPE, 0) & (reduced | mask)) == mask)
-            apply_mask(tiff, raster.z);
+        return open_vrt(file, band);
+    return std::make_unique<TiffReader>(file, band);
+}
+
+Raster read_raster(const fs::path& file, int band) {
+    const std::unique_ptr<RasterReader> reader = open_raster(file, band);
+    const auto width = static_cast<std::uint64_t>(reader->size.width),
+               height = static_cast<std::uint64_t>(reader->size.height);
+    (void)image_check::checked_size(width, height, file);
+    require_memory(width * height * sizeof(float), file.string());
+    Raster raster{cv::Mat1f(reader->size), reader->base, reader->grid, reader->notes};
+    reader->read(0, raster.z);
     return raster;
 }
 

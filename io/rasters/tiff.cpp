@@ -156,13 +156,50 @@ std::vector<double> TiffInput::doubles(std::uint32_t tag) const { return values<
 std::vector<std::uint16_t> TiffInput::shorts(std::uint32_t tag) const { return values<std::uint16_t>(tag, TIFF_SHORT); }
 
 std::string TiffInput::ascii(std::uint32_t tag) const {
+    // Tags that another library of the process has described to libtiff, as GDAL does, come without a count.
+    if (const TIFFField* field = TIFFFindField(tiff_.get(), tag, TIFF_ANY);
+        field && TIFFFieldDataType(field) == TIFF_ASCII && !TIFFFieldPassCount(field)) {
+        const char* text = nullptr;
+        return TIFFGetField(tiff_.get(), tag, &text) && text ? text : "";
+    }
     const std::vector<char> found = values<char>(tag, TIFF_ASCII);
     return {found.begin(), std::ranges::find(found, '\0')};
 }
 
-TiffOutput::TiffOutput(const std::filesystem::path& file, bool big) : file_(file), tiff_(nullptr, &TIFFClose) {
-    const OpenOptions options = options_with(trouble_);
-    tiff_.reset(TIFFOpenExt(file.c_str(), big ? "w8" : "w", options.get()));
+struct TiffOutput::Sink {
+    std::string bytes{};
+    std::uint64_t at = 0;
+    std::string trouble{}; ///< libtiff's first error
+
+    static Sink& of(thandle_t handle) { return *static_cast<Sink*>(handle); }
+    static tmsize_t read(thandle_t handle, void* to, tmsize_t count) {
+        Sink& sink = of(handle);
+        const std::size_t length = sink.bytes.copy(static_cast<char*>(to), static_cast<std::size_t>(count),
+                                                   std::min<std::size_t>(sink.at, sink.bytes.size()));
+        sink.at += length;
+        return static_cast<tmsize_t>(length);
+    }
+    static tmsize_t write(thandle_t handle, void* from, tmsize_t count) {
+        Sink& sink = of(handle);
+        const auto length = static_cast<std::size_t>(count);
+        sink.bytes.resize(std::max<std::size_t>(sink.bytes.size(), sink.at + length));
+        std::memcpy(sink.bytes.data() + sink.at, from, length);
+        sink.at += length;
+        return count;
+    }
+    static toff_t seek(thandle_t handle, toff_t offset, int from) {
+        Sink& sink = of(handle);
+        sink.at = offset + (from == SEEK_CUR ? sink.at : from == SEEK_END ? sink.bytes.size() : 0);
+        return sink.at;
+    }
+    static toff_t size(thandle_t handle) { return of(handle).bytes.size(); }
+};
+
+TiffOutput::TiffOutput(bool big) : sink_(std::make_unique<Sink>()), tiff_(nullptr, &TIFFClose) {
+    const OpenOptions options = options_with(sink_->trouble);
+    const auto close_nothing = [](thandle_t) { return 0; };
+    tiff_.reset(TIFFClientOpenExt("", big ? "w8" : "w", sink_.get(), &Sink::read, &Sink::write, &Sink::seek,
+                                  close_nothing, &Sink::size, nullptr, nullptr, options.get()));
     check(tiff_ != nullptr);
     describe_tags(tiff_.get());
 }
@@ -171,7 +208,7 @@ TiffOutput::~TiffOutput() = default;
 
 void TiffOutput::check(bool done) const {
     if (!done)
-        throw Outage(fmt::format("{}: cannot be written as TIFF: {}", file_.string(), trouble_));
+        throw std::runtime_error("a TIFF cannot be made: " + sink_->trouble);
 }
 
 void TiffOutput::set(std::uint32_t tag, int value) { check(TIFFSetField(tiff_.get(), tag, value)); }
@@ -190,10 +227,18 @@ void TiffOutput::write_strip(std::uint32_t strip, std::string_view bytes) {
     check(TIFFWriteEncodedStrip(tiff_.get(), strip, copy.data(), static_cast<tmsize_t>(copy.size())) >= 0);
 }
 
-void TiffOutput::close() {
+std::string TiffOutput::packed_tile(std::string_view bytes) {
+    std::string copy(bytes); // libtiff may change its input
+    check(TIFFWriteEncodedTile(tiff_.get(), 0, copy.data(), static_cast<tmsize_t>(copy.size())) >= 0 &&
+          TIFFFlushData(tiff_.get()) != 0);
+    return sink_->bytes.substr(TIFFGetStrileOffset(tiff_.get(), 0), TIFFGetStrileByteCount(tiff_.get(), 0));
+}
+
+std::string TiffOutput::close() {
     check(TIFFWriteDirectory(tiff_.get()) == 1);
     tiff_.reset(); // flushes
-    check(trouble_.empty());
+    check(sink_->trouble.empty());
+    return std::move(sink_->bytes);
 }
 
 } // namespace scanshade::rasters

@@ -62,10 +62,10 @@ class TiffInput {
     ~TiffInput();
 };
 
-/// A TIFF to be written to a path.
+/// A TIFF that is made in memory.
 class TiffOutput {
   public:
-    TiffOutput(const std::filesystem::path& file, bool big);
+    explicit TiffOutput(bool big = false);
     ~TiffOutput();
     TiffOutput(const TiffOutput&) = delete;
     TiffOutput& operator=(const TiffOutput&) = delete;
@@ -74,16 +74,17 @@ class TiffOutput {
     void set(std::uint32_t tag, const std::string& text);
     void set(std::uint32_t tag, const std::vector<double>& values);
     void set(std::uint32_t tag, const std::vector<std::uint16_t>& values);
-    /// Rows from `row` on.
     void write_strip(std::uint32_t strip, std::string_view bytes);
-    /// All is written; throws Outage where the disk is full.
-    void close();
+    /// Tile 0 as the file has it: compressed.
+    [[nodiscard]] std::string packed_tile(std::string_view bytes);
+    /// The file.
+    [[nodiscard]] std::string close();
 
   private:
+    struct Sink;
     void check(bool done) const;
 
-    std::filesystem::path file_;
-    std::string trouble_; ///< libtiff's first error
+    std::unique_ptr<Sink> sink_;
     std::unique_ptr<TIFF, decltype(&TIFFClose)> tiff_;
 };
 

@@ -1,10 +1,8 @@
 // GDAL's virtual rasters: a text that puts parts of other rasters side by side. Sources at the scale 1:1 only.
 #include "io/rasters/vrt.h"
 
-#include "io/images/image_check.h"
 #include "io/text.h"
 #include "projection/base/error.h"
-#include "projection/base/memory.h"
 
 #include <algorithm>
 #include <cmath>
@@ -38,7 +36,7 @@ struct Source {
     fs::path file;
     int band = 0;
     cv::Rect from, to;
-    std::optional<double> nodata; ///< of ComplexSource
+    std::vector<double> nodata; ///< of ComplexSource, and of the band
 };
 
 Source source_of(const pugi::xml_node& node, const fs::path& file) {
@@ -59,8 +57,9 @@ Source source_of(const pugi::xml_node& node, const fs::path& file) {
     for (const char* element : {"ScaleRatio", "ScaleOffset", "LUT", "ColorTableComponent", "Exponent"})
         if (node.child(element))
             refuse(file, fmt::format("source {} is changed by {}, which is not read", source.file.string(), element));
-    if (node.child("NODATA"))
-        source.nodata = number(trimmed(node.child("NODATA").text().get()));
+    for (const pugi::xml_node& nodata : {node.child("NODATA"), node.parent().child("NoDataValue")})
+        if (const auto value = number(trimmed(nodata.text().get())))
+            source.nodata.push_back(*value);
     return source;
 }
 
@@ -87,39 +86,97 @@ Grid grid_of(const pugi::xml_node& top, const fs::path& file, std::vector<std::s
     return grid;
 }
 
-/// Where the source has heights, they replace what is there.
-void put(const Source& source, const fs::path& file, Raster& raster, bool first) {
-    if (is_vrt(source.file))
-        refuse(file, fmt::format("source {} is a virtual raster, too, expected a TIFF", source.file.string()));
-    const Raster part = during(file.string(), [&] { return read_raster(source.file, source.band); });
-    const cv::Rect whole(cv::Point(), part.z.size());
-    if ((source.from & whole) != source.from || (source.to & cv::Rect(cv::Point(), raster.z.size())) != source.to)
-        refuse(file, fmt::format("source {} has {}x{} cells, and a part of it is outside or would lie outside",
-                                 source.file.string(), part.z.cols, part.z.rows));
-    if (first)
-        raster.base = part.base;
-    for (int r = 0; r < source.from.height; ++r)
-        for (int c = 0; c < source.from.width; ++c) {
-            const double height = double(part.z(source.from.y + r, source.from.x + c)) + part.base;
-            if (!std::isnan(height) && height != source.nodata)
-                raster.z(source.to.y + r, source.to.x + c) = static_cast<float>(height - raster.base);
-        }
+/// Numbers of text are compared in the precision of the heights, too.
+auto is_same_as(double height) {
+    return [height](double nodata) {
+        return height == nodata || height == static_cast<double>(static_cast<float>(nodata));
+    };
 }
+
+/// A part of each source at a time; those whose rows are passed are closed.
+class VrtReader final : public RasterReader {
+  public:
+    /// `changed`: the band says that heights are numbers times a scale.
+    VrtReader(fs::path file, cv::Size whole, Grid place, std::vector<std::string> said, std::vector<Source> sources,
+              bool changed)
+        : file_(std::move(file)), sources_(std::move(sources)), open_(sources_.size()) {
+        size = whole, grid = std::move(place), notes = std::move(said);
+        for (std::size_t i = 0; i < sources_.size(); ++i) {
+            const std::unique_ptr<RasterReader> part = opened(sources_[i]);
+            if (i == 0)
+                base = part->base;
+            if (changed && !part->scaled)
+                refuse(file_, fmt::format("its band has a scale that source {} does not have, which is not read; "
+                                          "`gdal_translate -unscale` makes a raster of heights",
+                                          sources_[i].file.string()));
+        }
+    }
+
+    /// Where a source has heights, they replace what is there.
+    void read(int first, cv::Mat1f& z) override {
+        z.setTo(std::nanf(""));
+        for (std::size_t i = 0; i < sources_.size(); ++i) {
+            const Source& source = sources_[i];
+            const int begin = std::max(first, source.to.y), end = std::min(first + z.rows, source.to.br().y);
+            if (begin < end && !open_[i])
+                open_[i] = opened(source);
+            for (int row = begin; row < end;) {
+                constexpr int rows_at_once = 256;
+                cv::Mat1f part(std::min(rows_at_once, end - row), open_[i]->size.width);
+                during(file_.string(), [&] { open_[i]->read(row - source.to.y + source.from.y, part); });
+                put(source, open_[i]->base, part, row - first, z);
+                row += part.rows;
+            }
+            if (source.to.br().y <= first + z.rows)
+                open_[i].reset();
+        }
+    }
+
+  private:
+    [[nodiscard]] std::unique_ptr<RasterReader> opened(const Source& source) const {
+        if (is_vrt(source.file))
+            refuse(file_, fmt::format("source {} is a virtual raster, too, expected a TIFF", source.file.string()));
+        std::unique_ptr<RasterReader> part =
+            during(file_.string(), [&] { return open_raster(source.file, source.band); });
+        if ((source.from & cv::Rect(cv::Point(), part->size)) != source.from ||
+            (source.to & cv::Rect(cv::Point(), size)) != source.to)
+            refuse(file_, fmt::format("source {} has {}x{} cells, and a part of it is outside or would lie outside",
+                                      source.file.string(), part->size.width, part->size.height));
+        return part;
+    }
+
+    /// Rows of a source, to row `to` of z.
+    void put(const Source& source, double source_base, const cv::Mat1f& part, int to, cv::Mat1f& z) const {
+        for (int r = 0; r < part.rows; ++r)
+            for (int c = 0; c < source.from.width; ++c) {
+                const double height = double(part(r, source.from.x + c)) + source_base;
+                if (!std::isnan(height) && std::ranges::none_of(source.nodata, is_same_as(height)))
+                    z(to + r, source.to.x + c) = static_cast<float>(height - base);
+            }
+    }
+
+    fs::path file_;
+    std::vector<Source> sources_;
+    std::vector<std::unique_ptr<RasterReader>> open_; ///< null: not now
+};
 
 } // namespace
 
 bool is_vrt(const fs::path& file) { return lower_extension(file) == ".vrt"; }
 
-Raster read_vrt(const fs::path& file, int band) {
+std::unique_ptr<RasterReader> open_vrt(const fs::path& file, int band) {
     constexpr std::size_t most = 1 << 26;
     const std::string text = read_at_most(most, file, "a virtual raster");
     pugi::xml_document document;
     if (!document.load_buffer(text.data(), text.size()))
         refuse(file, "is no XML");
     const pugi::xml_node top = document.child("VRTDataset");
-    Raster raster;
-    const cv::Size size = image_check::checked_size(top.attribute("rasterXSize").as_ullong(),
-                                                    top.attribute("rasterYSize").as_ullong(), file);
+    constexpr int most_cells = 1 << 30; // of a side
+    const int width = top.attribute("rasterXSize").as_int(), height = top.attribute("rasterYSize").as_int();
+    if (width < 1 || height < 1 || width > most_cells || height > most_cells)
+        refuse(file, fmt::format("rasterXSize {} and rasterYSize {}, expected 1 to {}",
+                                 in_quotes(top.attribute("rasterXSize").value()),
+                                 in_quotes(top.attribute("rasterYSize").value()), most_cells));
     const auto bands = top.children("VRTRasterBand");
     const auto count = std::distance(bands.begin(), bands.end());
     if (band == 0 && count > 1)
@@ -127,22 +184,24 @@ Raster read_vrt(const fs::path& file, int band) {
     if (count == 0 || band > count)
         refuse(file, fmt::format("band {} of {}", std::max(band, 1), count));
     const pugi::xml_node chosen = *std::next(bands.begin(), std::max(band, 1) - 1);
-    raster.grid = grid_of(top, file, raster.notes);
-    require_memory(static_cast<std::uint64_t>(size.area()) * sizeof(float), file.string());
-    raster.z = cv::Mat1f(size, std::nanf(""));
-    bool first = true;
+    std::vector<std::string> notes;
+    Grid grid = grid_of(top, file, notes);
+    take_height_unit(grid.crs, std::string(trimmed(chosen.child("UnitType").text().get())), notes);
+    const bool changed =
+        chosen.child("Scale").text().as_double(1) != 1 || chosen.child("Offset").text().as_double(0) != 0;
+    std::vector<Source> sources;
     for (const pugi::xml_node& node : chosen.children()) {
         const std::string_view kind = node.name();
         if (!kind.ends_with("Source"))
             continue;
         if (kind != "SimpleSource" && kind != "ComplexSource")
             refuse(file, fmt::format("a source of kind {}, which is not read", kind));
-        put(source_of(node, file), file, raster, first);
-        first = false;
+        sources.push_back(source_of(node, file));
     }
-    if (first)
+    if (sources.empty())
         refuse(file, "a virtual raster without sources");
-    return raster;
+    return std::make_unique<VrtReader>(file, cv::Size(width, height), std::move(grid), std::move(notes),
+                                       std::move(sources), changed);
 }
 
 } // namespace scanshade::rasters

@@ -7,7 +7,7 @@ namespace scanshade::rasters {
 
 /// By its name.
 [[nodiscard]] bool is_vrt(const std::filesystem::path& file);
-/// As read_raster(). Throws Error, too, for sources that are scaled, changed, or virtual rasters that hold themselves.
-[[nodiscard]] Raster read_vrt(const std::filesystem::path& file, int band);
+/// As open_raster(). Throws Error, too, for sources that are scaled, changed, or virtual rasters.
+[[nodiscard]] std::unique_ptr<RasterReader> open_vrt(const std::filesystem::path& file, int band);
 
 } // namespace scanshade::rasters

@@ -1,4 +1,5 @@
 // Rasters of maps: written and read again, in all layouts, and what is refused.
+#include "io/rasters/cog.h"
 #include "io/rasters/raster.h"
 #include "io/rasters/tiff.h"
 #include "io/rasters/well_known_text.h"
@@ -64,8 +65,7 @@ struct Made {
     std::function<void(TiffOutput&)> more = [](TiffOutput&) {};
 
     [[nodiscard]] fs::path write(const std::string& name, bool big = false) const {
-        const fs::path path = folder() / name;
-        TiffOutput tiff(path, big);
+        TiffOutput tiff(big);
         tiff.set(TIFFTAG_IMAGEWIDTH, size.width);
         tiff.set(TIFFTAG_IMAGELENGTH, size.height);
         tiff.set(TIFFTAG_BITSPERSAMPLE, bits);
@@ -76,8 +76,7 @@ struct Made {
         tiff.set(TIFFTAG_ROWSPERSTRIP, size.height);
         more(tiff);
         tiff.write_strip(0, bytes);
-        tiff.close();
-        return path;
+        return tests::write_file(folder() / name, tiff.close());
     }
 };
 
@@ -293,6 +292,188 @@ TEST(Rasters, virtual_rasters_join_their_sources) {
     EXPECT_TRUE(says(refused(vrt_of(vrt_source("west.tif", 0, 0, 30, 30), "0, 1, 0.5, 0, 0, -1")), "north up"));
     EXPECT_TRUE(says(refused(vrt_of("")), "without sources"));
     EXPECT_TRUE(says(refused("<VRT"), "no XML"));
+}
+
+/// GDAL takes a number without data from the band, as it takes a unit of heights; and a mask from beside the file.
+TEST(Rasters, what_gdal_says_of_a_band_is_heard) {
+    Made file = made(std::vector<float>{5, -9999.9F, 7, 8}, {2, 2});
+    file.more = [](TiffOutput& tiff) {
+        place(tiff);
+        tiff.set(
+            tag_metadata,
+            std::string(R"(<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">ft</Item></GDALMetadata>)"));
+    };
+    const Raster feet = read_raster(file.write("band.tif"));
+    EXPECT_EQ(feet.grid.crs.height_unit_m, 0.3048);
+    EXPECT_TRUE(tests::warned(feet.notes, "Heights are in ft"));
+    const auto vrt = [&](const std::string& band) {
+        return tests::write_file(
+            folder() / "band.vrt",
+            R"(<VRTDataset rasterXSize="2" rasterYSize="2"><GeoTransform>0,2,0,0,0,-2</GeoTransform><VRTRasterBand band="1">)" +
+                band +
+                R"(<SimpleSource><SourceFilename relativeToVRT="1">band.tif</SourceFilename><SrcRect xOff="0" yOff="0" xSize="2" ySize="2"/><DstRect xOff="0" yOff="0" xSize="2" ySize="2"/></SimpleSource></VRTRasterBand></VRTDataset>)");
+    };
+    const Raster whole = read_raster(vrt("<NoDataValue>-9999.9</NoDataValue><UnitType>us-ft</UnitType>"));
+    EXPECT_TRUE(std::isnan(whole.z(0, 1)));
+    EXPECT_EQ(whole.z(1, 1), 8);
+    EXPECT_NEAR(whole.grid.crs.height_unit_m, 1200.0 / 3937, 1e-12);
+    EXPECT_TRUE(says(refusal([&] { (void)read_raster(vrt("<Scale>0.01</Scale>")); }), "scale"));
+    Made mask = made(std::vector<std::uint8_t>{255, 255, 0, 255}, {2, 2});
+    fs::rename(mask.write("mask.tif"), folder() / "band.tif.msk");
+    EXPECT_TRUE(std::isnan(read_raster(folder() / "band.tif").z(1, 0)));
+    EXPECT_EQ(read_raster(folder() / "band.tif").z(0, 0), 5);
+    write_raster(folder() / "large.tif", heights(), grid(), {});
+    fs::rename(folder() / "large.tif", folder() / "band.tif.msk");
+    EXPECT_TRUE(says(refusal([&] { (void)read_raster(folder() / "band.tif"); }), "expected a mask"));
+    fs::remove(folder() / "band.tif.msk");
+}
+
+/// GDAL in the same process describes its tags to libtiff, which then hands them out in another way.
+TEST(Rasters, tags_are_read_beside_gdal_too) {
+    Made file = made(std::vector<float>{5, -9999, 7, 8}, {2, 2});
+    file.more = [](TiffOutput& tiff) {
+        place(tiff);
+        tiff.set(tag_nodata, std::string("-9999"));
+        tiff.set(tag_metadata,
+                 std::string(R"(<GDALMetadata><Item name="SCALE" sample="0" role="scale">2</Item></GDALMetadata>)"));
+    };
+    const fs::path path = file.write("beside_gdal.tif");
+    static TIFFExtendProc before = nullptr;
+    before = TIFFSetTagExtender([](TIFF* tiff) {
+        static char name[] = "described";
+        static const TIFFFieldInfo rows[] = {{tag_nodata, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, name},
+                                             {tag_metadata, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, name},
+                                             {tag_key_ascii, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, name},
+                                             {tag_scale, -1, -1, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, name},
+                                             {tag_keys, -1, -1, TIFF_SHORT, FIELD_CUSTOM, 1, 1, name}};
+        TIFFMergeFieldInfo(tiff, rows, std::size(rows));
+    });
+    const Raster raster = read_raster(path);
+    TIFFSetTagExtender(before);
+    EXPECT_TRUE(std::isnan(raster.z(0, 1)));
+    EXPECT_EQ(raster.z(1, 1) + raster.base, 16);
+    EXPECT_EQ(raster.grid.cell, 2);
+    EXPECT_EQ(raster.grid.crs.epsg, 32633);
+}
+
+/// Larger than a tile, with holes at its end.
+const cv::Mat1f& large_heights() {
+    static const cv::Mat1f heights = [] {
+        cv::Mat1f z(1100, 700);
+        cv::RNG(7).fill(z, cv::RNG::UNIFORM, 300, 340);
+        z(cv::Rect(690, 1090, 10, 10)) = NAN;
+        z(0, 0) = NAN;
+        return z;
+    }();
+    return heights;
+}
+
+/// Rows in any portions, each of them once or not at all.
+cv::Mat1f read_in_portions(const fs::path& path, int rows) {
+    const auto reader = open_raster(path);
+    cv::Mat1f z(reader->size);
+    for (int row = 0; row < z.rows; row += rows) {
+        cv::Mat1f part = z.rowRange(row, std::min(row + rows, z.rows));
+        reader->read(row, part);
+        if (reader->base != 0)
+            part += reader->base;
+    }
+    return z;
+}
+
+TEST(Rasters, rows_in_portions_are_those_of_the_whole) {
+    const fs::path tiled = folder() / "tiled.tif", vrt = folder() / "stacked.vrt";
+    write_raster(tiled, large_heights(), grid(), {});
+    const std::string rects =
+        "<SrcRect xOff=\"0\" yOff=\"0\" xSize=\"700\" ySize=\"1100\"/><DstRect xOff=\"0\" yOff=\"";
+    const std::string name = "<SimpleSource><SourceFilename relativeToVRT=\"1\">tiled.tif</SourceFilename>";
+    const std::string size = "\" xSize=\"700\" ySize=\"1100\"/></SimpleSource>";
+    tests::write_file(vrt,
+                      "<VRTDataset rasterXSize=\"700\" rasterYSize=\"2200\"><GeoTransform>0,1,0,0,0,-1</GeoTransform>"
+                      "<VRTRasterBand band=\"1\">" +
+                          name + rects + "0" + size + name + rects + "1100" + size + "</VRTRasterBand></VRTDataset>");
+    cv::Mat1f twice;
+    cv::vconcat(large_heights(), large_heights(), twice);
+    Made strip = made(std::vector<float>(large_heights().begin(), large_heights().end()), large_heights().size());
+    Made doubles = made(std::vector<double>(large_heights().begin(), large_heights().end()), large_heights().size());
+    strip.more = doubles.more = place; // one strip of 3 MB is read at once, one of 6 MB row by row
+    const fs::path strips = strip.write("one_strip.tif"), rows = doubles.write("row_by_row.tif");
+    for (const int portion : {1, 77, 512, 5000}) {
+        EXPECT_TRUE(same(read_in_portions(tiled, portion), large_heights())) << portion;
+        EXPECT_TRUE(same(read_in_portions(vrt, portion), twice)) << portion;
+        EXPECT_TRUE(same(read_in_portions(strips, portion), large_heights())) << portion;
+        EXPECT_LT(cv::norm(read_in_portions(rows, portion)(cv::Rect(1, 1, 600, 1000)) -
+                               large_heights()(cv::Rect(1, 1, 600, 1000)),
+                           cv::NORM_INF),
+                  1e-4)
+            << portion;
+    }
+}
+
+TEST(Rasters, rows_in_portions_make_the_same_file) {
+    write_raster(folder() / "at_once.tif", large_heights(), grid(), {"text", {}});
+    const cv::Mat1f z = large_heights();
+    for (const int rows : {1, 100, 512, 600}) {
+        RasterWriter writer(folder() / "portions.tif", z.size(), CV_32FC1, grid(), {"text", {}});
+        for (int row = 0; row < z.rows; row += rows)
+            writer.write(z.rowRange(row, std::min(row + rows, z.rows)));
+        writer.finish();
+        EXPECT_EQ(tests::file_bytes(folder() / "portions.tif"), tests::file_bytes(folder() / "at_once.tif")) << rows;
+    }
+}
+
+/// Directories from large to small at the head, tiles from small to large behind them; a cell of an overview is the
+/// mean of those that are known.
+TEST(Rasters, a_written_raster_is_cloud_optimized) {
+    const fs::path path = folder() / "cog.tif";
+    write_raster(path, large_heights(), grid(), {});
+    TiffInput tiff(path);
+    std::vector<std::uint64_t> directories, tiles;
+    std::vector<cv::Size> sizes;
+    cv::Mat1f first_tile(512, 512);
+    do {
+        directories.push_back(TIFFCurrentDirOffset(tiff.get()));
+        tiles.push_back(TIFFGetStrileOffset(tiff.get(), 0));
+        sizes.emplace_back(tiff.number(TIFFTAG_IMAGEWIDTH, 0), tiff.number(TIFFTAG_IMAGELENGTH, 0));
+        EXPECT_EQ(tiff.number(TIFFTAG_SUBFILETYPE, 0) & FILETYPE_REDUCEDIMAGE, directories.size() == 1 ? 0U : 1U);
+        if (directories.size() == 2) {
+            ASSERT_GT(TIFFReadEncodedTile(tiff.get(), 0, first_tile.data, 512 * 512 * 4), 0);
+        }
+    } while (tiff.next_directory());
+    EXPECT_EQ(sizes, (std::vector<cv::Size>{{700, 1100}, {350, 550}, {175, 275}}));
+    EXPECT_EQ(directories.front(), 8U);
+    EXPECT_TRUE(std::ranges::is_sorted(directories));
+    EXPECT_TRUE(std::is_sorted(tiles.rbegin(), tiles.rend()));
+    EXPECT_GT(tiles.back(), directories.back());
+    const cv::Mat1f z = large_heights();
+    EXPECT_NEAR(first_tile(1, 1), (z(2, 2) + z(2, 3) + z(3, 2) + z(3, 3)) / 4, 1e-4);
+    EXPECT_NEAR(first_tile(0, 0), (z(0, 1) + z(1, 0) + z(1, 1)) / 3, 1e-4);
+}
+
+TEST(Rasters, big_tiff_holds_the_same) {
+    const fs::path path = folder() / "big_cog.tif";
+    const cv::Mat1f z(16, 16, 7.0F);
+    TiffOutput tile;
+    for (const auto& [tag, value] :
+         {std::pair(TIFFTAG_IMAGEWIDTH, 16), std::pair(TIFFTAG_IMAGELENGTH, 16), std::pair(TIFFTAG_TILEWIDTH, 16),
+          std::pair(TIFFTAG_TILELENGTH, 16), std::pair(TIFFTAG_BITSPERSAMPLE, 32),
+          std::pair(TIFFTAG_SAMPLESPERPIXEL, 1), std::pair(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_IEEEFP),
+          std::pair(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG), std::pair(TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK)})
+        tile.set(static_cast<std::uint32_t>(tag), value);
+    Spool spool(folder());
+    const auto part = spool.add(tile.packed_tile({reinterpret_cast<const char*>(z.data), 16 * 16 * 4}));
+    const auto one = [](int id, int value) {
+        return short_tag(static_cast<std::uint16_t>(id), {static_cast<std::uint16_t>(value)});
+    };
+    write_cog(
+        path,
+        {{{one(TIFFTAG_IMAGEWIDTH, 16), one(TIFFTAG_IMAGELENGTH, 16), one(TIFFTAG_BITSPERSAMPLE, 32),
+           one(TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK), one(TIFFTAG_SAMPLESPERPIXEL, 1),
+           one(TIFFTAG_TILEWIDTH, 16), one(TIFFTAG_TILELENGTH, 16), one(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_IEEEFP)},
+          {part}}},
+        spool, true);
+    EXPECT_EQ(tests::file_bytes(path).substr(2, 1), "\x2b");
+    EXPECT_TRUE(same(read_raster(path).z, z));
 }
 
 TEST(Rasters, cut_files_are_refused_wherever_they_end) {
