@@ -54,17 +54,17 @@ float between(const float* corner, std::ptrdiff_t stride, const Look& look) {
 
 } // namespace
 
-cv::Mat1f dominance_of(const HeightField& field, const Settings& settings) {
-    const Dominance& rows = settings.dominance;
+cv::Mat1f dominance_of(const HeightField& field, const Settings& settings, cv::Range rows) {
+    const Dominance& radii = settings.dominance;
     const bool exact = settings.profile == Profile::exact;
-    const Padded padded(field.z, rows.most + 2, exact ? Border::nothing : Border::repeated,
+    const Padded padded(field.z, radii.most + 2, exact ? Border::nothing : Border::repeated,
                         static_cast<float>(settings.exaggeration), 1);
     const std::ptrdiff_t stride = padded.stride();
     const std::vector<Look> looks =
-        exact ? places_between(rows, settings.directions, stride) : nearest_cells(rows, stride);
-    const auto observer = static_cast<float>(rows.observer);
-    cv::Mat1f dominance(field.z.size());
-    tbb::parallel_for(0, field.z.rows, [&](int r) {
+        exact ? places_between(radii, settings.directions, stride) : nearest_cells(radii, stride);
+    const auto observer = static_cast<float>(radii.observer);
+    cv::Mat1f dominance(rows.size(), field.z.cols);
+    tbb::parallel_for(rows.start, rows.end, [&](int r) {
         const int columns = field.z.cols;
         std::vector<double> sums(static_cast<std::size_t>(columns)), most(static_cast<std::size_t>(columns));
         const float* z = padded.at(r, 0);
@@ -77,11 +77,13 @@ cv::Mat1f dominance_of(const HeightField& field, const Settings& settings) {
                 sums[static_cast<std::size_t>(c)] += above > 0 ? above * look.weight : 0;
                 most[static_cast<std::size_t>(c)] += exact && std::isnan(there) ? 0 : observer * look.weight;
             }
-        for (int c = 0; c < columns; ++c)
-            dominance(r, c) =
-                std::isnan(z[c])
-                    ? z[c]
-                    : static_cast<float>(sums[static_cast<std::size_t>(c)] / most[static_cast<std::size_t>(c)]);
+        for (int c = 0; c < columns; ++c) {
+            const double sum = sums[static_cast<std::size_t>(c)], whole = most[static_cast<std::size_t>(c)];
+            // Where nothing is known around a cell, it is as high as that.
+            dominance(r - rows.start, c) = std::isnan(z[c]) ? z[c]
+                                           : whole == 0     ? 1.0F
+                                                            : static_cast<float>(sum / whole);
+        }
     });
     return dominance;
 }

@@ -5,7 +5,7 @@
 
 namespace scanshade::horizon {
 
-/// 1 on a level plane; NaN where the field is.
-[[nodiscard]] cv::Mat1f dominance_of(const HeightField& field, const Settings& settings);
+/// Of some rows: 1 on a level plane, and where nothing is known around a cell; NaN where the field is.
+[[nodiscard]] cv::Mat1f dominance_of(const HeightField& field, const Settings& settings, cv::Range rows);
 
 } // namespace scanshade::horizon

@@ -109,6 +109,8 @@ struct Walk {
     std::vector<std::vector<Offset>> offsets; ///< profile rvt
     std::vector<double> angles;               ///< of the directions, for the anisotropic sky
     std::vector<float> east, north;           ///< unit vectors of the directions
+
+    [[nodiscard]] int directions() const { return static_cast<int>(angles.size()); }
 };
 
 Walk exact_walk(const HeightField& field, const Settings& settings) {
@@ -142,12 +144,37 @@ Walk rvt_walk(const HeightField& field, const Settings& settings) {
     return walk;
 }
 
+/// Leaves out the directions that do not count.
+void keep(Walk& walk, Sky sky) {
+    if (sky == Sky::whole || walk.angles.empty())
+        return;
+    constexpr float least = 1e-6F; // directions along the border between halves are in neither
+    Walk kept{std::move(walk.field), {}, {}, {}, {}, {}};
+    for (std::size_t i = 0; i < walk.angles.size(); ++i) {
+        const float toward = sky == Sky::north   ? walk.north[i]
+                             : sky == Sky::south ? -walk.north[i]
+                             : sky == Sky::east  ? walk.east[i]
+                                                 : -walk.east[i];
+        if (toward < least)
+            continue;
+        kept.angles.push_back(walk.angles[i]), kept.east.push_back(walk.east[i]), kept.north.push_back(walk.north[i]);
+        if (!walk.rays.empty())
+            kept.rays.push_back(std::move(walk.rays[i]));
+        if (!walk.offsets.empty())
+            kept.offsets.push_back(std::move(walk.offsets[i]));
+    }
+    if (kept.angles.empty())
+        throw Misuse("no direction lies in that half of the sky; four directions are enough");
+    walk = std::move(kept);
+}
+
 /// What is the same for all cells.
 struct Job {
     const HeightField& field;
     const Settings& settings;
     const Wanted& wanted;
     Layers& layers;
+    int first = 0;              ///< row of the field that is the layers' row 0
     const Walk* sky = nullptr;  ///< sky views and openness; null = none is wanted
     const Walk* ball = nullptr; ///< ao; null = not wanted
     std::vector<float> brightness{};
@@ -163,22 +190,18 @@ class Chunk {
     }
 
     void compute() {
-        const int directions = job_.settings.directions;
         Sums sky = sums(), ball;
         std::swap(sky.ao, ball.ao);
-        for (int i = 0; i < directions; ++i) {
-            if (job_.sky) {
-                const Part part{job_.brightness[static_cast<std::size_t>(i)], plane_toward(*job_.sky, i)};
-                look(*job_.sky, i);
-                kernels().add(horizons_, count_, part, sky);
-            }
-            if (job_.ball) {
-                const Part part{0, plane_toward(*job_.ball, i)};
-                const auto radius = static_cast<float>(job_.settings.radius / job_.field.cell);
-                kernels().look_in_ball(cells(*job_.ball), job_.ball->rays[static_cast<std::size_t>(i)], radius,
-                                       horizons_);
-                kernels().add(horizons_, count_, part, ball);
-            }
+        for (int i = 0; job_.sky && i < job_.sky->directions(); ++i) {
+            const Part part{job_.brightness[static_cast<std::size_t>(i)], plane_toward(*job_.sky, i)};
+            look(*job_.sky, i);
+            kernels().add(horizons_, count_, part, sky);
+        }
+        const auto radius = static_cast<float>(job_.settings.radius / job_.field.cell);
+        for (int i = 0; job_.ball && i < job_.ball->directions(); ++i) {
+            const Part part{0, plane_toward(*job_.ball, i)};
+            kernels().look_in_ball(cells(*job_.ball), job_.ball->rays[static_cast<std::size_t>(i)], radius, horizons_);
+            kernels().add(horizons_, count_, part, ball);
         }
         finish();
     }
@@ -189,8 +212,9 @@ class Chunk {
         const auto row_of = [&](cv::Mat1f& layer) -> float* {
             if (layer.empty())
                 return nullptr;
-            std::fill_n(layer[row_] + column_, count_, 0.0F);
-            return layer[row_] + column_;
+            float* row = layer[row_ - job_.first] + column_;
+            std::fill_n(row, count_, 0.0F);
+            return row;
         };
         Layers& layers = job_.layers;
         return {row_of(layers.svf),          row_of(layers.asvf), row_of(layers.openness),
@@ -221,7 +245,8 @@ class Chunk {
     }
 
     void finish() {
-        const float share = 1.0F / static_cast<float>(job_.settings.directions);
+        const auto share_of = [](const Walk* walk) { return walk ? 1.0F / static_cast<float>(walk->directions()) : 0; };
+        const float share = share_of(job_.sky);
         Row up;
         for (int x = 0; x < count_; ++x)
             up[x] = 1 / std::sqrt(1 + east_[x] * east_[x] + north_[x] * north_[x]);
@@ -230,14 +255,14 @@ class Chunk {
         scale(layers.asvf, 1 / job_.sum_of_brightness, nullptr);
         scale(layers.openness, share, nullptr);
         scale(layers.openness_neg, share, nullptr);
-        scale(layers.ao, share, &up);
+        scale(layers.ao, share_of(job_.ball), &up);
     }
 
     /// NaN where the field is.
     void scale(cv::Mat1f& layer, float share, const Row* up) {
         if (layer.empty())
             return;
-        float* values = layer[row_] + column_;
+        float* values = layer[row_ - job_.first] + column_;
         const float* heights = job_.field.z[row_] + column_;
         for (int x = 0; x < count_; ++x)
             values[x] *= share;
@@ -257,17 +282,19 @@ class Chunk {
 
 } // namespace
 
-Layers layers_of(const HeightField& field, const Settings& settings, const Wanted& wanted) {
+Layers layers_of(const HeightField& field, const Settings& settings, const Wanted& wanted, cv::Range rows) {
     check(field, settings);
+    if (rows == cv::Range::all())
+        rows = {0, field.z.rows};
     Layers layers;
     for (const auto& [layer, asked] :
          {std::pair(&layers.svf, wanted.svf), std::pair(&layers.asvf, wanted.asvf),
           std::pair(&layers.openness, wanted.openness), std::pair(&layers.openness_neg, wanted.openness_neg),
           std::pair(&layers.ao, wanted.ao)})
         if (asked)
-            layer->create(field.z.size());
+            layer->create(rows.size(), field.z.cols);
     if (wanted.dominance)
-        layers.dominance = dominance_of(field, settings);
+        layers.dominance = dominance_of(field, settings, rows);
     const bool sky_wanted = wanted.svf || wanted.asvf || wanted.openness || wanted.openness_neg;
     const bool exact = settings.profile == Profile::exact;
     Walk rays, cells;
@@ -275,15 +302,21 @@ Layers layers_of(const HeightField& field, const Settings& settings, const Wante
         rays = exact_walk(field, settings);
     if (sky_wanted && !exact)
         cells = rvt_walk(field, settings);
-    Job job{
-        field, settings, wanted, layers, sky_wanted ? exact ? &rays : &cells : nullptr, wanted.ao ? &rays : nullptr};
+    keep(rays, settings.sky), keep(cells, settings.sky);
+    Job job{field,
+            settings,
+            wanted,
+            layers,
+            rows.start,
+            sky_wanted ? exact ? &rays : &cells : nullptr,
+            wanted.ao ? &rays : nullptr};
     if (!job.sky && !job.ball)
         return layers;
     for (const double angle : (job.sky ? job.sky : job.ball)->angles)
         job.brightness.push_back(static_cast<float>(brightness(angle, settings)));
     for (const float each : job.brightness)
         job.sum_of_brightness += each;
-    tbb::parallel_for(0, field.z.rows, [&](int row) {
+    tbb::parallel_for(rows.start, rows.end, [&](int row) {
         for (int column = 0; column < field.z.cols; column += most_cells)
             Chunk(job, row, column, std::min(most_cells, field.z.cols - column)).compute();
     });
@@ -291,8 +324,9 @@ Layers layers_of(const HeightField& field, const Settings& settings, const Wante
 }
 
 int reach_of(double cell, const Settings& settings, const Wanted& wanted) {
-    const int radius = static_cast<int>(std::ceil(radius_in_cells(cell, settings))) + 1;
-    return wanted.dominance ? std::max(radius, settings.dominance.most + 1) : radius;
+    constexpr int rim = 3; // of padded fields, whose holes decide on the kernel; and of planes
+    const int radius = static_cast<int>(std::ceil(radius_in_cells(cell, settings))) + rim;
+    return wanted.dominance ? std::max(radius, settings.dominance.most + rim) : radius;
 }
 
 Slopes slopes_of(const HeightField& field, double exaggeration) {

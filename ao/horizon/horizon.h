@@ -32,6 +32,9 @@ enum class Noise { none, low, medium, high };
 
 enum class Anisotropy { low, high };
 
+/// The directions that count: all of them, or those towards one side.
+enum class Sky { whole, north, east, south, west };
+
 /// Local dominance: radii in cells, and the observer's height in the unit of the heights.
 struct Dominance {
     int least = 10, most = 20, step = 1; ///< cells
@@ -46,6 +49,7 @@ struct Settings {
     Noise noise = Noise::none;
     double exaggeration = 1; ///< of heights, before anything else
     Definition definition = Definition::solid_angle;
+    Sky sky = Sky::whole; ///< of all layers but dominance
     Anisotropy anisotropy = Anisotropy::low;
     double azimuth = 315; ///< degrees clockwise from north, of the anisotropic sky's brightest part. RVT counts it
                           ///< counterclockwise; so does profile rvt
@@ -57,7 +61,8 @@ struct Wanted {
     bool svf = false, asvf = false, openness = false, openness_neg = false, dominance = false, ao = false;
 };
 
-/// As large as the field; those not wanted are empty. NaN where the field has no data, and only there.
+/// As wide as the field, a row for each that was asked for; those not wanted are empty. NaN where the field has no
+/// data, and only there.
 struct Layers {
     cv::Mat1f svf;          ///< 0 .. 1
     cv::Mat1f asvf;         ///< anisotropic, of the solid angle: 0 .. 1
@@ -69,10 +74,12 @@ struct Layers {
 };
 
 /// Works on all processors (oneTBB). The same field gives the same bits however many there are. Throws Misuse for
-/// settings out of range: a radius below one cell or above 4096, directions outside 1 .. 4096, and so on.
-[[nodiscard]] Layers layers_of(const HeightField& field, const Settings& settings, const Wanted& wanted);
+/// settings out of range: a radius below one cell or above 4096, directions outside 1 .. 4096, and so on. `rows`: those
+/// to compute. Where the field is a part of a larger one, they have the bits of the whole if reach_of() rows of it are
+/// known on either side.
+[[nodiscard]] Layers layers_of(const HeightField& field, const Settings& settings, const Wanted& wanted,
+                               cv::Range rows = cv::Range::all());
 
-/// How far a cell looks, in whole cells: what must be known around a part of a larger field.
 [[nodiscard]] int reach_of(double cell, const Settings& settings, const Wanted& wanted);
 
 /// Slopes of the least-squares plane through the known of the 3x3 cells around each: towards the east, towards the

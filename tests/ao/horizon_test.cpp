@@ -228,6 +228,23 @@ TEST(Horizon, anisotropy_counts_azimuths_clockwise) {
     EXPECT_LT(at(corner(1, 1)), at(corner(-1, 1)) - 0.05);
 }
 
+/// A long wall in the north takes from the northern half alone, twice what it takes from the whole.
+TEST(Horizon, halves_of_the_sky_are_those_of_their_sides) {
+    const HeightField field = made(81, [](double, double north) { return north >= 12 ? 12 : 0; });
+    for (Settings settings : {exact(40, 64, Definition::horizontal), rvt(40, 64)}) {
+        const auto view = [&](Sky sky) {
+            settings.sky = sky;
+            return svf_at(field, 40, 40, settings);
+        };
+        const float whole = view(Sky::whole), north = view(Sky::north), east = view(Sky::east);
+        EXPECT_EQ(view(Sky::south), 1);
+        EXPECT_LT(whole, 0.95F);
+        EXPECT_NEAR(north, 2 * whole - 1, 0.01);
+        EXPECT_NEAR(east, view(Sky::west), 1e-5);
+        EXPECT_NEAR(east, whole, 0.01);
+    }
+}
+
 /// Height of the bilinear surface; NaN outside and in squares that lack a corner.
 double bilinear(const cv::Mat1f& z, double row, double column) {
     const double r = std::floor(row), c = std::floor(column);
