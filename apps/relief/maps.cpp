@@ -1,6 +1,7 @@
 #include "apps/relief/maps.h"
 
-#include "projection/base/error.h"
+#include "apps/relief/svfs.h"
+#include "projection/base/memory.h"
 
 #include <algorithm>
 #include <array>
@@ -15,6 +16,9 @@ using namespace horizon;
 
 namespace {
 
+/// Before the names of views.
+const std::string views_folder = "svfs/";
+
 /// A layer's part of a file name, and its stretch.
 struct MapRow {
     std::string_view name;
@@ -24,7 +28,7 @@ struct MapRow {
     bool Wanted::*wanted = nullptr;
 };
 
-const std::array rows = {
+const std::array map_rows = {
     MapRow{"svf", 0.6375F, 1, false, &Layers::svf, &Wanted::svf},
     MapRow{"asvf", 0.7F, 0.9F, false, &Layers::asvf, &Wanted::asvf},
     MapRow{"openness", 60, 95, false, &Layers::openness, &Wanted::openness},
@@ -35,7 +39,7 @@ const std::array rows = {
     MapRow{"source"},
 };
 
-const MapRow& row_of(const std::string& layer) { return *std::ranges::find(rows, layer, &MapRow::name); }
+const MapRow& row_of(const std::string& layer) { return *std::ranges::find(map_rows, layer, &MapRow::name); }
 
 std::string noise_suffix(const std::string& layer, Noise noise) {
     switch (noise) {
@@ -127,12 +131,57 @@ double radius_in_cells(const Settings& settings, const rasters::Grid& grid) {
     return settings.profile == Profile::rvt ? std::nearbyint(radius) : radius;
 }
 
+/// The views of svfs.zip are of the horizontal definition.
+Settings of_sky(Settings settings, Sky sky) {
+    settings.definition = Definition::horizontal;
+    settings.sky = sky;
+    return settings;
+}
+
+int type_of(const std::string& layer) { return layer == "source" ? CV_8UC1 : CV_32FC1; }
+
+Maps empty_maps(const MapSettings& settings, cv::Size size) {
+    const auto cells = static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height);
+    require_memory(cells * sizeof(float) * settings.write.size(), "the maps");
+    Maps maps;
+    for (const std::string& layer : settings.write)
+        maps.push_back({layer, cv::Mat(size, type_of(layer))});
+    return maps;
+}
+
+void put(Maps& maps, const std::string& layer, int first, const cv::Mat& rows) {
+    rows.copyTo(std::ranges::find(maps, layer, &NamedMap::name)->values.rowRange(first, first + rows.rows));
+}
+
+/// The rows of a raster that a band needs, each read once.
+class RowWindow {
+  public:
+    explicit RowWindow(rasters::RasterReader& raster) : raster_(raster) {}
+    /// Bands follow one another: neither number falls.
+    cv::Mat1f rows(int begin, int end) {
+        cv::Mat1f z(end - begin, raster_.size.width);
+        if (begin < end_)
+            z_.rowRange(begin - begin_, end_ - begin_).copyTo(z.rowRange(0, end_ - begin));
+        const int from = std::max(begin, end_);
+        cv::Mat1f more = z.rowRange(from - begin, end - begin);
+        if (!more.empty())
+            raster_.read(from, more);
+        z_ = z, begin_ = begin, end_ = end;
+        return z;
+    }
+
+  private:
+    rasters::RasterReader& raster_;
+    cv::Mat1f z_;
+    int begin_ = 0, end_ = 0; ///< rows in z_
+};
+
 } // namespace
 
 const std::vector<std::string>& map_names() {
     static const std::vector<std::string> names = [] {
         std::vector<std::string> all;
-        for (const MapRow& row : rows)
+        for (const MapRow& row : map_rows)
             all.emplace_back(row.name);
         return all;
     }();
@@ -175,38 +224,95 @@ std::vector<fs::path> map_files(const std::string& name, const rasters::Grid& gr
         if (settings.bytes && row_of(layer).layer)
             files.push_back(folder / map_file_name(name, layer, walk, radius_in_cells(walk, grid), true));
     }
+    if (settings.svfs)
+        files.push_back(folder / (name + "_svfs.zip"));
     return files;
 }
 
-std::vector<fs::path> write_maps(const std::string& name, const rasters::Raster& raster, const cv::Mat1b& source,
-                                 const MapSettings& settings, const fs::path& folder) {
-    const Settings walk = with_radius(settings.walk, raster.grid);
+std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, const TakeRows& take, int band_rows) {
+    rasters::RasterReader& raster = heights.rows;
+    const Settings walk = in_units_of(raster.grid, with_radius(settings.walk, raster.grid));
     Wanted wanted;
     for (const std::string& layer : settings.write)
         if (row_of(layer).wanted)
             wanted.*row_of(layer).wanted = true;
-    Layers layers = layers_of({raster.z, raster.grid.cell}, in_units_of(raster.grid, walk), wanted);
-    const double radius = radius_in_cells(walk, raster.grid);
-    std::vector<fs::path> files;
-    const auto write = [&](const std::string& layer, const cv::Mat& values, bool bytes) {
-        files.push_back(folder / map_file_name(name, layer, walk, radius, bytes));
-        rasters::write_raster(files.back(), values, raster.grid, text_of(layer, walk));
+    RowWindow window(raster);
+    std::int64_t known = 0;
+    const int reach = reach_of(raster.grid.cell, walk, wanted);
+    for (int first = 0; first < raster.size.height; first += band_rows) {
+        const int last = std::min(first + band_rows, raster.size.height);
+        const int begin = std::max(first - reach, 0), end = std::min(last + reach, raster.size.height);
+        const HeightField field{window.rows(begin, end), raster.grid.cell};
+        const cv::Range own(first - begin, last - begin);
+        const cv::Mat1f z = field.z.rowRange(own);
+        known += cv::countNonZero(measured_cells(z));
+        const Layers layers = layers_of(field, walk, wanted, own);
+        for (const std::string& layer : settings.write)
+            if (const MapRow& row = row_of(layer); row.layer)
+                take(layer, first, layers.*row.layer);
+            else if (layer == "dtm")
+                take(layer, first, raster.base == 0 ? cv::Mat(z) : cv::Mat(z + raster.base));
+            else
+                take(layer, first, heights.source.empty() ? measured_cells(z) : heights.source.rowRange(first, last));
+        for (std::size_t i = 0; settings.svfs && i < svfs_views().size(); ++i)
+            take(views_folder + svfs_views()[i].name, first,
+                 layers_of(field, of_sky(walk, svfs_views()[i].sky), {.svf = true}, own).svf);
+    }
+    return known;
+}
+
+Maps maps_of(const Heights& heights, const MapSettings& settings) {
+    Maps maps = empty_maps(settings, heights.rows.size);
+    compute_maps(heights, settings,
+                 [&](const std::string& layer, int first, const cv::Mat& rows) { put(maps, layer, first, rows); });
+    return maps;
+}
+
+Written write_maps(const std::string& name, const Heights& heights, const MapSettings& settings, const fs::path& folder,
+                   Maps* kept) {
+    const rasters::Grid& grid = heights.rows.grid;
+    const Settings walk = with_radius(settings.walk, grid);
+    struct Output {
+        std::string layer;
+        bool bytes = false;
+        rasters::RasterWriter writer;
+    };
+    std::vector<Output> outputs;
+    std::vector<fs::path> files = map_files(name, grid, settings, folder);
+    auto file = files.begin();
+    const auto add = [&](const std::string& layer, bool bytes) {
+        const bool nearest = layer == "source";
+        outputs.push_back({layer, bytes,
+                           rasters::RasterWriter(*file++, heights.rows.size, bytes ? CV_8UC1 : type_of(layer), grid,
+                                                 text_of(layer, walk),
+                                                 nearest ? rasters::Overviews::nearest : rasters::Overviews::mean)});
     };
     for (const std::string& layer : settings.write) {
-        const MapRow& row = row_of(layer);
-        if (row.layer) {
-            cv::Mat1f& values = layers.*row.layer;
-            write(layer, values, false);
-            if (settings.bytes)
-                write(layer, stretched(values, layer), true);
-            values.release();
-        } else if (layer == "dtm") {
-            write(layer, raster.base == 0 ? cv::Mat(raster.z) : cv::Mat(raster.z + raster.base), false);
-        } else {
-            write(layer, source.empty() ? measured_cells(raster.z) : source, false);
-        }
+        add(layer, false);
+        if (settings.bytes && row_of(layer).layer)
+            add(layer, true);
     }
-    return files;
+    std::optional<SvfsZip> zip;
+    if (settings.svfs)
+        zip.emplace(*file, heights.rows.size, grid, text_of("svf", of_sky(walk, Sky::whole)));
+    if (kept)
+        *kept = empty_maps(settings, heights.rows.size);
+    const std::int64_t known =
+        compute_maps(heights, settings, [&](const std::string& layer, int first, const cv::Mat& rows) {
+            for (std::size_t i = 0; zip && i < svfs_views().size(); ++i)
+                if (layer == views_folder + svfs_views()[i].name)
+                    return zip->write(i, rows);
+            for (Output& output : outputs)
+                if (output.layer == layer)
+                    output.writer.write(output.bytes ? cv::Mat(stretched(rows, layer)) : rows);
+            if (kept)
+                put(*kept, layer, first, rows);
+        });
+    for (Output& output : outputs)
+        output.writer.finish();
+    if (zip)
+        zip->finish();
+    return {std::move(files), known};
 }
 
 } // namespace scanshade::relief

@@ -4,7 +4,9 @@
 #include "ao/horizon/horizon.h"
 #include "io/rasters/raster.h"
 
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -15,6 +17,7 @@ struct MapSettings {
     horizon::Settings walk;
     std::vector<std::string> write{"svf"}; ///< names of map_names()
     bool bytes = false;                    ///< each also with 8 bits, stretched
+    bool svfs = false;                     ///< svfs.zip, too
 };
 
 /// What `write` may hold: svf, asvf, openness, openness-neg, dominance, ao, dtm, source.
@@ -36,10 +39,38 @@ struct MapSettings {
                                                            const MapSettings& settings,
                                                            const std::filesystem::path& folder);
 
-/// Computes and writes all layers; returns the files. `source` may be empty where the input is a raster. Throws Error,
-/// Misuse, Outage.
-std::vector<std::filesystem::path> write_maps(const std::string& name, const rasters::Raster& raster,
-                                              const cv::Mat1b& source, const MapSettings& settings,
-                                              const std::filesystem::path& folder);
+/// What maps are made of.
+struct Heights {
+    rasters::RasterReader& rows;
+    cv::Mat1b source; ///< of each cell; empty where the input is a raster
+};
+
+/// A map of `write` and its values: floats, `source` bytes.
+struct NamedMap {
+    std::string name;
+    cv::Mat values;
+};
+using Maps = std::vector<NamedMap>;
+
+/// Rows of one map from `first` on.
+using TakeRows = std::function<void(const std::string& layer, int first, const cv::Mat& rows)>;
+
+/// All maps, and views of svfs_views() by their names in front of ".tif", by bands of rows from the north; memory grows
+/// with the width of the raster alone. Values do not depend on `band_rows`. Returns how many cells have a height.
+/// Throws Error, Misuse.
+std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, const TakeRows& take,
+                          int band_rows = 512);
+
+/// The same as whole arrays.
+[[nodiscard]] Maps maps_of(const Heights& heights, const MapSettings& settings);
+
+struct Written {
+    std::vector<std::filesystem::path> files;
+    std::int64_t known = 0; ///< cells with a height
+};
+
+/// Computes and writes all maps, and keeps them where `kept` is not null. Throws Error, Misuse, Outage.
+Written write_maps(const std::string& name, const Heights& heights, const MapSettings& settings,
+                   const std::filesystem::path& folder, Maps* kept = nullptr);
 
 } // namespace scanshade::relief

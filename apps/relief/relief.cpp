@@ -1,13 +1,11 @@
 // `scanshade relief`: DEMs, or points of a survey, become rasters of sky view, openness, dominance and AO.
 #include "apps/command.h"
-#include "apps/lists.h"
-#include "apps/relief/maps.h"
-#include "apps/relief/surface.h"
+#include "apps/relief/points.h"
+#include "apps/relief/settings.h"
 #include "io/clouds/format.h"
 #include "io/files.h"
 #include "io/text.h"
 #include "projection/base/error.h"
-#include "projection/base/nearest_word.h"
 #include "projection/base/stopwatch.h"
 
 #include <algorithm>
@@ -20,16 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace relief;
-
-constexpr std::array profile_words{Named{"exact", horizon::Profile::exact}, Named{"rvt", horizon::Profile::rvt}};
-constexpr std::array definition_words{Named{"solid-angle", horizon::Definition::solid_angle},
-                                      Named{"horizontal", horizon::Definition::horizontal},
-                                      Named{"surface", horizon::Definition::surface}};
-constexpr std::array noise_words{Named{"none", horizon::Noise::none}, Named{"low", horizon::Noise::low},
-                                 Named{"medium", horizon::Noise::medium}, Named{"high", horizon::Noise::high}};
-constexpr std::array level_words{Named{"low", horizon::Anisotropy::low}, Named{"high", horizon::Anisotropy::high}};
-constexpr std::array surface_words{Named{"ground", Surface::ground}, Named{"top", Surface::top},
-                                   Named{"all", Surface::all}};
 
 /// Up to its first dot, as the toolbox names results.
 std::string name_of(const fs::path& file) {
@@ -85,89 +73,22 @@ class Relief final : public Command {
     }
 
     std::vector<Stage> stages() override {
-        horizon::Settings& walk = settings_.walk;
-        return {
-            {"input",
-             {{.name = "surface",
-               .help = "which points make the surface: classified ground, the highest of each cell, or the mean of all",
-               .value = OneOf(&surface_.surface, surface_words),
-               .common = true},
-              {.name = "cell",
-               .help = "size of cells of a survey; 0: about a point each",
-               .value = &surface_.cell_m,
-               .unit = "m",
-               .low = 0,
-               .common = true},
-              {.name = "fill",
-               .help = "cells without points take heights from around, if the nearest is no farther; 0: 3 m or 6 cells",
-               .value = &surface_.fill_m,
-               .unit = "m",
-               .low = 0},
-              {.name = "band",
-               .help = "band of a raster that has the heights; 0: the only one",
-               .value = &band_,
-               .low = 0,
-               .high = 65535}}},
-            {"maps",
-             {{.name = "write",
-               .help =
-                   fmt::format("maps to write, of {}; 8bit: each also stretched to bytes", fmt::join(map_names(), ",")),
-               .value = &write_,
-               .common = true},
-              {.name = "radius",
-               .help = "how far a cell looks; 0: 10 cells",
-               .value = &walk.radius,
-               .unit = "m",
-               .low = 0,
-               .common = true},
-              {.name = "directions",
-               .help = "directions of a cell",
-               .value = &walk.directions,
-               .low = 4,
-               .high = 1024,
-               .common = true},
-              {.name = "definition",
-               .help = "of the sky-view factor: share of the solid angle, light on a horizontal plate, or light on the "
-                       "surface",
-               .value = OneOf(&walk.definition, definition_words),
-               .common = true},
-              {.name = "profile",
-               .help = "exact: horizons on the bilinear surface; rvt: the cells, roundings and borders of the Relief "
-                       "Visualization Toolbox",
-               .value = OneOf(&walk.profile, profile_words),
-               .common = true},
-              {.name = "noise",
-               .help = "leaves out the nearest 0, 10, 20 or 40 % of the radius",
-               .value = OneOf(&walk.noise, noise_words)},
-              {.name = "exaggeration",
-               .help = "factor of heights",
-               .value = &walk.exaggeration,
-               .low = 0.001,
-               .high = 1000},
-              {.name = "asvf-level",
-               .help = "how uneven the anisotropic sky is",
-               .value = OneOf(&walk.anisotropy, level_words)},
-              {.name = "asvf-azimuth",
-               .help = "of its brightest part, clockwise from north",
-               .value = &walk.azimuth,
-               .unit = "degrees",
-               .low = 0,
-               .high = 360},
-              {.name = "dominance",
-               .help = "local dominance: least radius, largest, and step, in cells; degrees between directions (rvt); "
-                       "observer's height in m",
-               .value = &dominance_}}},
+        std::vector<Stage> stages = settings_.stages();
+        stages.push_back(
             {"output",
              {{.name = "out", .help = "folder of the maps", .value = &out_, .common = true, .writes = Writes::folder},
               {.name = "overwrite", .help = "replace earlier maps", .value = &overwrite_},
-              {.name = "quiet", .help = "prints only failures", .value = &quiet_}}}};
+              {.name = "quiet", .help = "prints only failures", .value = &quiet_}}});
+        return stages;
     }
 
     int run() override {
         if (out_.empty())
             throw Misuse("relief needs -o FOLDER for the maps");
-        take_lists();
+        settings_.resolve();
         const Inputs inputs = inputs_of(paths_);
+        if (settings_.points && inputs.clouds.empty())
+            throw Misuse("--write points: no input has points");
         std::size_t failed = 0, done = 0;
         const auto attempt = [&](const auto& action) {
             try {
@@ -190,30 +111,13 @@ class Relief final : public Command {
     }
 
   private:
-    void take_lists() {
-        settings_.write.clear();
-        for (const std::string& word : comma_separated(write_))
-            if (word == "8bit")
-                settings_.bytes = true;
-            else if (std::ranges::find(map_names(), word) == map_names().end())
-                throw Misuse(fmt::format("--write {}: no such map{}", word, suggestion(word, map_names())));
-            else if (std::ranges::find(settings_.write, word) == settings_.write.end())
-                settings_.write.push_back(word);
-        if (settings_.write.empty())
-            throw Misuse("--write names no map");
-        const std::vector<double> d = numbers("dominance", dominance_, 0);
-        const auto whole = [](double value) { return value == std::floor(value) && value <= 4096; };
-        if (d.size() != 5 || !std::all_of(d.begin(), d.begin() + 4, whole))
-            throw Misuse(fmt::format(
-                "--dominance {}: expected five numbers such as 10,20,1,15,1.7, the first four whole", dominance_));
-        settings_.walk.dominance = {static_cast<int>(d[0]), static_cast<int>(d[1]), static_cast<int>(d[2]),
-                                    static_cast<int>(d[3]), d[4]};
-    }
-
     void map_raster(const fs::path& file) {
         const Stopwatch stopwatch;
-        const rasters::Raster raster = rasters::read_raster(file, band_);
-        during(file.string(), [&] { map(name_of(file), file.string(), raster, {}, stopwatch); });
+        const std::unique_ptr<rasters::RasterReader> heights = rasters::open_raster(file, settings_.band);
+        during(file.string(), [&] {
+            claim(map_files(name_of(file), heights->grid, settings_.maps, out_));
+            map(name_of(file), file.string(), {*heights, {}}, stopwatch, nullptr);
+        });
     }
 
     void map_survey(const std::vector<fs::path>& files) {
@@ -223,40 +127,61 @@ class Relief final : public Command {
             fmt::print(stderr, "{}\n", warning);
         const std::string what =
             files.size() == 1 ? files.front().string() : fmt::format("{} files of points", files.size());
-        SurfaceRaster surface = during(what, [&] { return surface_of(survey, surface_); });
-        surface.raster.notes.insert(surface.raster.notes.begin(), survey.notes.begin(), survey.notes.end());
+        const SurfaceRaster surface = during(what, [&] { return surface_of(survey, settings_.surface); });
         // Many files are named by their folder.
         const std::string name =
             files.size() == 1 ? name_of(files.front()) : name_of(fs::absolute(files.front()).parent_path());
-        during(what, [&] { map(name, what, surface.raster, surface.source, stopwatch); });
+        rasters::MemoryReader heights(surface.raster);
+        heights.notes.insert(heights.notes.begin(), survey.notes.begin(), survey.notes.end());
+        Maps maps;
+        during(what, [&] {
+            claim(map_files(name, heights.grid, settings_.maps, out_));
+            if (settings_.points)
+                claim(point_files(survey, out_));
+            map(name, what, {heights, surface.source}, stopwatch, settings_.points ? &maps : nullptr);
+        });
+        if (!settings_.points)
+            return;
+        write_points(survey, cells_of_points(survey, surface, settings_.surface.surface), maps,
+                     point_files(survey, out_));
+        report(point_files(survey, out_));
     }
 
-    void map(const std::string& name, const std::string& what, const rasters::Raster& raster, const cv::Mat1b& source,
-             const Stopwatch& stopwatch) {
-        for (const fs::path& file : map_files(name, raster.grid, settings_, out_)) {
+    /// Files to be written, which must be new.
+    void claim(const std::vector<fs::path>& files) {
+        for (const fs::path& file : files) {
             if (!written_.insert(file.string()).second)
                 throw Error(fmt::format("another input has made {} already", file.string()));
             if (!overwrite_ && is_there(file))
                 throw Error(
                     fmt::format("{} exists already: --overwrite replaces it, or choose another folder", file.string()));
         }
-        for (const std::string& note : raster.notes)
+    }
+
+    void map(const std::string& name, const std::string& what, const Heights& heights, const Stopwatch& stopwatch,
+             Maps* kept) {
+        const rasters::RasterReader& rows = heights.rows;
+        for (const std::string& note : rows.notes)
             fmt::print(stderr, "{}: {}\n", what, note);
-        const std::vector<fs::path> files = write_maps(name, raster, source, settings_, out_);
-        if (quiet_)
-            return;
-        fmt::print(stderr, "{}: {} x {} cells of {:.6g} m, {:.2f} s\n", what, raster.z.cols, raster.z.rows,
-                   raster.grid.cell * raster.grid.crs.unit_m, stopwatch.seconds());
+        const Written written = write_maps(name, heights, settings_.maps, out_, kept);
+        if (written.known == 0)
+            fmt::print(stderr, "{}: no cell has a height: the maps are empty\n", what);
+        if (!quiet_)
+            fmt::print(stderr, "{}: {} x {} cells of {:.6g} m, {:.2f} s\n", what, rows.size.width, rows.size.height,
+                       rows.grid.cell * rows.grid.crs.unit_m, stopwatch.seconds());
+        report(written.files);
+    }
+
+    void report(const std::vector<fs::path>& files) const {
         for (const fs::path& file : files)
-            fmt::print(stderr, "  -> {}\n", file.string());
+            if (!quiet_)
+                fmt::print(stderr, "  -> {}\n", file.string());
     }
 
     std::vector<std::string> paths_;
-    std::string out_, write_ = "svf", dominance_ = "10,20,1,15,1.7";
-    int band_ = 0;
+    std::string out_;
     bool overwrite_ = false, quiet_ = false;
-    MapSettings settings_{.walk = {.radius = 0, .dominance = {}}};
-    SurfaceOptions surface_;
+    ReliefSettings settings_;
     std::set<std::string> written_;
 };
 

@@ -1,5 +1,6 @@
 #include "apps/relief/surface.h"
 
+#include "ao/horizon/horizon.h"
 #include "apps/relief/ground_filter.h"
 #include "apps/relief/triangles.h"
 #include "io/clouds/cloud_file.h"
@@ -52,14 +53,20 @@ void add(SurveyPoints& survey, const fs::path& file, bool first) {
                     "by PDAL's filters.reprojection");
     if (first)
         survey.crs = crs;
-    else if (crs.epsg != survey.crs.epsg || crs.unit_m != survey.crs.unit_m)
-        throw Error(fmt::format("{}: its coordinate system (EPSG {}) is not that of the files before (EPSG {})",
-                                file.string(), crs.epsg, survey.crs.epsg));
+    else if (crs.epsg != survey.crs.epsg || crs.unit_m != survey.crs.unit_m ||
+             crs.height_unit_m != survey.crs.height_unit_m)
+        throw Error(
+            fmt::format("{}: its coordinate system (EPSG {}, units of {} m, heights of {} m) is not that of the "
+                        "files before (EPSG {}, {} m, {} m)",
+                        file.string(), crs.epsg, crs.unit_m, crs.height_unit_m, survey.crs.epsg, survey.crs.unit_m,
+                        survey.crs.height_unit_m));
     std::vector<std::uint8_t> classes = classes_of(cloud, file);
     classes.resize(cloud.points.size());
     survey.ground_classified = survey.ground_classified || std::ranges::find(classes, ground) != classes.end();
     survey.points.insert(survey.points.end(), cloud.points.begin(), cloud.points.end());
     survey.classes.insert(survey.classes.end(), classes.begin(), classes.end());
+    survey.extensions.push_back(cloud.records ? extension(*cloud.records) : ".ply");
+    survey.files.push_back(file), survey.ends.push_back(survey.points.size());
 }
 
 /// The cells of a survey, in the unit of its coordinates.
@@ -246,6 +253,30 @@ SurfaceRaster surface_of(const SurveyPoints& survey, const SurfaceOptions& optio
         }
     result.raster.z = z, result.raster.base = base, result.raster.grid = grid;
     return result;
+}
+
+std::vector<int> cells_of_points(const SurveyPoints& survey, const SurfaceRaster& surface, Surface kind) {
+    const rasters::Grid& grid = surface.raster.grid;
+    const Cells cells = cells_of(survey, grid.cell);
+    CV_Assert(cells.size == surface.raster.z.size());
+    const double most_above = ground_tolerance_m() / grid.crs.height_unit_m;
+    const horizon::Slopes slopes = horizon::slopes_of({surface.raster.z, grid.cell});
+    const auto above = [&](const Eigen::Vector3d& point, int row, int column) {
+        const double east = point.x() - grid.x0 - (column + 0.5) * grid.cell,
+                     north = point.y() - grid.y0 + (row + 0.5) * grid.cell;
+        return point.z() - surface.raster.base - surface.raster.z(row, column) - slopes.east(row, column) * east -
+               slopes.north(row, column) * north;
+    };
+    std::vector<int> found;
+    found.reserve(survey.points.size());
+    int row = 0, column = 0;
+    for (const Eigen::Vector3d& point : survey.points) {
+        const bool inside = cells.find(point, row, column);
+        const bool of_surface =
+            inside && (kind == Surface::top || above(point, row, column) <= most_above); // not of NaN
+        found.push_back(of_surface ? row * cells.size.width + column : -1);
+    }
+    return found;
 }
 
 } // namespace scanshade::relief

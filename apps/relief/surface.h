@@ -23,6 +23,9 @@ struct SurveyPoints {
     std::vector<std::uint8_t> classes;   ///< of LAS; 0 where the file has none
     bool ground_classified = false;      ///< a point of class 2 is there
     rasters::Crs crs;
+    std::vector<std::filesystem::path> files;
+    std::vector<std::string> extensions; ///< ".laz" ..., as clouds are written again
+    std::vector<std::size_t> ends;       ///< behind each file's points
     double step = 0;                     ///< to which coordinates are rounded; 0: not known to be
     std::vector<std::string> notes{};    ///< sentences
     std::vector<std::string> warnings{}; ///< sentences that name their file
@@ -47,5 +50,9 @@ struct SurfaceOptions {
 /// Corners lie on multiples of the cell. Ground is a mean of points in a cell, read at the cell's centre from triangles
 /// between those means (Delaunay). Throws Error where no point is of the surface.
 [[nodiscard]] SurfaceRaster surface_of(const SurveyPoints& survey, const SurfaceOptions& options);
+
+/// The cell of each point, row by row; -1 for points without coordinates, and for those more than 0.3 m above the plane
+/// of their cell, which are not of the surface. Of `top` all are.
+[[nodiscard]] std::vector<int> cells_of_points(const SurveyPoints& survey, const SurfaceRaster& surface, Surface kind);
 
 } // namespace scanshade::relief

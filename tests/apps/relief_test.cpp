@@ -7,6 +7,8 @@
 #include "tests/support/files.h"
 
 #include <cmath>
+#include <cstdlib>
+#include <cstring>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <random>
@@ -146,6 +148,77 @@ TEST(Relief, survey_without_points_of_the_surface_is_refused) {
     EXPECT_TRUE(says(refusal([&] { (void)surface_of(made_survey(true), {.cell_m = 1e-4}); }), "larger --cell"));
 }
 
+/// A raster in memory, with hills, holes and a step.
+rasters::Raster made_raster(cv::Size size) {
+    rasters::Raster raster{cv::Mat1f(size), 0, {}, {}};
+    for (int r = 0; r < size.height; ++r)
+        for (int c = 0; c < size.width; ++c)
+            raster.z(r, c) = static_cast<float>(300 + 3 * std::sin(r * 0.31) * std::cos(c * 0.23) + (c > 200 ? 4 : 0) +
+                                                0.05 * ((r * 7 + c * 13) % 11));
+    cv::Mat1f(raster.z, cv::Rect(30, 40, 5, 4) & cv::Rect(cv::Point(), size)).setTo(NAN);
+    return raster;
+}
+
+/// Bands see what is beyond their rows, whatever their height: borders, mirrored borders, holes.
+TEST(Relief, bands_have_the_bits_of_one_piece) {
+    const rasters::Raster raster = made_raster({300, 130});
+    MapSettings settings;
+    settings.write = {"svf", "asvf", "openness", "openness-neg", "dominance", "ao", "dtm", "source"};
+    settings.walk.radius = 7.5;
+    settings.walk.directions = 8;
+    for (const horizon::Profile profile : {horizon::Profile::exact, horizon::Profile::rvt}) {
+        settings.walk.profile = profile;
+        rasters::MemoryReader reader(raster);
+        const Maps whole = maps_of({reader, {}}, settings);
+        const horizon::Layers layers =
+            horizon::layers_of({raster.z, raster.grid.cell}, settings.walk, {true, true, true, true, true, true});
+        EXPECT_TRUE(std::equal(layers.ao.datastart, layers.ao.dataend, whole[5].values.datastart));
+        for (const int rows : {1, 16, 64}) {
+            rasters::MemoryReader again(raster);
+            std::size_t differ = 0, seen = 0;
+            compute_maps(
+                {again, {}}, settings,
+                [&](const std::string& layer, int first, const cv::Mat& part) {
+                    const cv::Mat one = std::ranges::find(whole, layer, &NamedMap::name)
+                                            ->values.rowRange(first, first + part.rows)
+                                            .clone();
+                    const cv::Mat other = part.clone();
+                    differ += std::memcmp(one.data, other.data, one.total() * one.elemSize()) != 0;
+                    ++seen;
+                },
+                rows);
+            EXPECT_EQ(differ, 0U) << rows;
+            EXPECT_EQ(seen, static_cast<std::size_t>((130 + rows - 1) / rows) * 8) << rows;
+        }
+    }
+}
+
+/// One cell wide, one cell alone, no height at all, cells of a millimetre and of a kilometre.
+TEST(Relief, odd_rasters_have_values_where_they_have_heights) {
+    MapSettings settings;
+    settings.write = {"svf", "openness", "dominance", "ao", "source"};
+    for (const horizon::Profile profile : {horizon::Profile::exact, horizon::Profile::rvt})
+        for (const cv::Size size : {cv::Size(1, 1), cv::Size(1, 90), cv::Size(90, 1), cv::Size(37, 53)})
+            for (const double cell : {0.001, 1.0, 1000.0}) {
+                rasters::Raster raster = made_raster(size);
+                raster.z *= cell;
+                raster.grid.cell = cell;
+                settings.walk.profile = profile;
+                settings.walk.radius = 0; // 10 cells
+                rasters::MemoryReader reader(raster);
+                for (const NamedMap& map : maps_of({reader, {}}, settings))
+                    for (int r = 0; r < size.height; ++r)
+                        for (int c = 0; c < size.width && map.name != "source"; ++c)
+                            EXPECT_EQ(std::isnan(map.values.at<float>(r, c)), std::isnan(raster.z(r, c))) << map.name;
+            }
+    rasters::Raster nothing = made_raster({20, 30});
+    nothing.z.setTo(NAN);
+    rasters::MemoryReader reader(nothing);
+    for (const NamedMap& map : maps_of({reader, {}}, settings))
+        EXPECT_EQ(cv::countNonZero(map.name == "source" ? map.values : cv::Mat(map.values == map.values)), 0)
+            << map.name;
+}
+
 tests::Ran run_relief(const std::string& words) { return tests::run_program("relief " + words); }
 
 fs::path made_dem(const fs::path& file) {
@@ -205,6 +278,117 @@ TEST(Relief, the_program_maps_any_cloud) {
     EXPECT_TRUE(says(ran.err, "no coordinate system"));
     EXPECT_EQ(rasters::read_raster(folder / "out" / "scan_SOURCE.tif").z.size(), cv::Size(60, 60));
     EXPECT_LT(rasters::read_raster(folder / "out" / "scan_SVF_R10_D16.tif").z(59 - 35, 40), 0.9F); // beside the trees
+}
+
+/// The corner of a cell on a steep slope lies far above the cell's centre, and is ground.
+TEST(Relief, points_of_a_slope_are_of_its_surface) {
+    SurveyPoints survey;
+    for (int i = 0; i < 4000; ++i) {
+        const double x = i % 80 * 0.25, y = i / 80 * 0.4;
+        survey.points.emplace_back(x, y, 2 * x - y);
+    }
+    survey.classes.assign(survey.points.size(), 2);
+    survey.ground_classified = true;
+    survey.points[100].z() += 0.5;
+    survey.classes[100] = 5;
+    const std::vector<int> cells = cells_of_points(survey, surface_of(survey, {.cell_m = 2}), Surface::ground);
+    EXPECT_EQ(std::ranges::count(cells, -1), 1);
+    EXPECT_EQ(cells[100], -1);
+}
+
+/// Every point gets the value of its cell; one far above the surface is none of it.
+TEST(Relief, values_of_cells_come_back_to_points) {
+    const tests::TemporaryFolder folder;
+    SurveyPoints survey = made_survey(true);
+    survey.points.emplace_back(30, 30, ground_at(30, 30) + 5);
+    survey.points.emplace_back(NAN, NAN, NAN);
+    write_new_ply(folder / "a.ply", survey.points, {}, {{"gps", std::vector<float>(survey.points.size(), 7)}});
+    write_new_ply(folder / "b.ply", {{61.5, 30.5, ground_at(61.5, 30.5)}}, {}, {});
+    const tests::Ran ran =
+        run_relief(fmt::format("{} {} -o {} --cell 1 --write openness-neg,ao,source,points",
+                               (folder / "a.ply").string(), (folder / "b.ply").string(), (folder / "out").string()));
+    ASSERT_EQ(ran.exit_code, all_well) << ran.err;
+    std::vector<std::string> warnings;
+    const fs::path file = folder / "out" / "a_POINTS.ply", other = folder / "out" / "b_POINTS.ply";
+    const Cloud cloud = read_cloud(file, warnings);
+    ASSERT_EQ(cloud.points.size(), survey.points.size());
+    EXPECT_EQ(recorded_field(cloud, "gps", file)[0], 7);
+    const std::string name = fs::path(folder / "x").parent_path().filename().string();
+    const cv::Mat1f ao = rasters::read_raster(folder / "out" / (name.substr(0, name.find('.')) + "_AO_R10.tif")).z;
+    const std::vector<float> values = recorded_field(cloud, "ambient_occlusion", file);
+    ASSERT_EQ(ao.rows, 60);
+    int known = 0;
+    for (std::size_t i = 0; i + 2 < values.size(); ++i) {
+        const int row = 59 - static_cast<int>(survey.points[i].y()), column = static_cast<int>(survey.points[i].x());
+        if (survey.classes[i] == 2) {
+            EXPECT_TRUE(values[i] == ao(row, column) || std::isnan(ao(row, column))) << i;
+            known += !std::isnan(values[i]);
+        }
+    }
+    EXPECT_GT(known, 13000);
+    EXPECT_TRUE(std::isnan(values[values.size() - 2]));
+    EXPECT_TRUE(std::isnan(values.back()));
+    EXPECT_GT(recorded_field(cloud, "openness_neg", file)[0], 60);
+    EXPECT_EQ(recorded_field(read_cloud(other, warnings), "source", other)[0], 1);
+    EXPECT_EQ(run_relief(fmt::format("{} -o {} --write svf,points", made_dem(folder / "dem.tif").string(),
+                                     (folder / "maps").string()))
+                  .exit_code,
+              misuse);
+}
+
+/// Readers of zips other than ours: the entries of the central directory, and Python's sums where it is there.
+TEST(Relief, views_of_the_halves_of_the_sky_are_a_zip) {
+    const tests::TemporaryFolder folder;
+    ASSERT_EQ(run_relief(fmt::format("{} -o {} --write svfs --radius 5", made_dem(folder / "dem.tif").string(),
+                                     (folder / "out").string()))
+                  .exit_code,
+              all_well);
+    const fs::path zip = folder / "out" / "dem_svfs.zip";
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder / "out"), fs::directory_iterator()), 1); // nothing else
+    const std::string bytes = tests::file_bytes(zip);
+    std::vector<std::string> names;
+    for (auto at = bytes.find("PK\1\2"); at != std::string::npos; at = bytes.find("PK\1\2", at + 4))
+        names.push_back(bytes.substr(at + 46, static_cast<unsigned char>(bytes[at + 28])));
+    ASSERT_EQ(names.size(), 15U);
+    EXPECT_EQ(names[0], "svf.tif");
+    EXPECT_EQ(names[1], "svfN.tif");
+    const auto first = bytes.find("svf.tif") + 7, second = bytes.find("PK\3\4", first);
+    const rasters::Raster svf =
+        rasters::read_raster(tests::write_file(folder / "svf.tif", bytes.substr(first, second - first)));
+    const rasters::Raster dem = rasters::read_raster(folder / "dem.tif");
+    EXPECT_EQ(svf.grid.x0, dem.grid.x0);
+    horizon::Settings settings;
+    settings.radius = 5, settings.definition = horizon::Definition::horizontal;
+    const cv::Mat1f expected = horizon::layers_of({dem.z, dem.grid.cell}, settings, {.svf = true}).svf;
+    EXPECT_EQ(svf.z(20, 20), expected(20, 20));
+    const int tested = std::system(
+        fmt::format("python3 -m zipfile -t {} > /dev/null 2>&1", zip.string()).c_str()); // NOLINT(cert-env33-c)
+    EXPECT_TRUE(tested == 0 || std::system("python3 --version > /dev/null 2>&1") != 0);  // NOLINT(cert-env33-c)
+}
+
+/// GDAL, where it is installed, finds the maps where the DEM lies.
+TEST(Relief, gdalinfo_reads_the_same_place) {
+    if (std::system("gdalinfo --version > /dev/null 2>&1") != 0) // NOLINT(cert-env33-c)
+        GTEST_SKIP() << "gdalinfo is not installed (Debian: gdal-bin)";
+    const tests::TemporaryFolder folder;
+    const fs::path dem = made_dem(folder / "dem.tif");
+    ASSERT_EQ(
+        run_relief(fmt::format("{} -o {} --write svf,source,8bit --radius 5", dem.string(), (folder / "out").string()))
+            .exit_code,
+        all_well);
+    const auto told = [&](const fs::path& file) {
+        const std::string command = fmt::format("gdalinfo {} > {} 2>&1", file.string(), (folder / "told.txt").string());
+        EXPECT_EQ(std::system(command.c_str()), 0); // NOLINT(cert-env33-c)
+        const std::string text = tests::file_bytes(folder / "told.txt");
+        EXPECT_EQ(text.find("Warning"), std::string::npos) << text;
+        const auto begin = text.find("Coordinate System is:"), metadata = text.find("Metadata:", begin);
+        return text.substr(begin, metadata - begin);
+    };
+    const std::string place = told(dem);
+    EXPECT_TRUE(says(place, "ID[\"EPSG\",32633]]"));
+    EXPECT_TRUE(says(place, "Origin = (500000.5"));
+    for (const char* name : {"dem_SVF_R10_D16.tif", "dem_SVF_R10_D16_8bit.tif", "dem_SOURCE.tif"})
+        EXPECT_EQ(told(folder / "out" / name), place) << name;
 }
 
 } // namespace
