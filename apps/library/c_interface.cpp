@@ -1,6 +1,7 @@
 // The C interface: handles and structs in, exceptions out as statuses.
 #include "apps/library/include/scanshade/scanshade.h"
 
+#include "apps/library/relief.h"
 #include "apps/library/session.h"
 #include "apps/refine/report.h"
 #include "io/cameras/camera_formats.h"
@@ -49,6 +50,10 @@ struct scanshade_frame {
 struct scanshade_refinement {
     scanshade_camera camera;
     std::string report, summary, trajectory;
+};
+
+struct scanshade_relief_maps {
+    library::ReliefMaps result;
 };
 
 namespace {
@@ -599,5 +604,46 @@ const char* scanshade_refinement_trajectory(const scanshade_refinement* refineme
     return refinement ? refinement->trajectory.c_str() : nullptr;
 }
 void scanshade_refinement_free(scanshade_refinement* refinement) { delete refinement; }
+
+scanshade_status scanshade_relief(const scanshade_heights* heights, const scanshade_setting* settings, size_t count,
+                                  scanshade_relief_maps** maps) {
+    return guarded([&] {
+        start(maps);
+        const scanshade_heights given = taken(heights, sizeof(scanshade_heights), "heights");
+        const Settings asked = settings_from(settings, count);
+        if (given.path) {
+            *maps = new scanshade_relief_maps{library::relief_of(given.path, asked)};
+            return;
+        }
+        require(given.values, "heights");
+        if (given.type != SCANSHADE_FLOAT32 && given.type != SCANSHADE_FLOAT64)
+            throw Misuse(fmt::format("heights: type {} given, expected FLOAT32 or FLOAT64", given.type));
+        *maps = new scanshade_relief_maps{library::relief_of(
+            {given.values, given.type == SCANSHADE_FLOAT64, {given.width, given.height}, given.row_bytes, given.cell},
+            asked)};
+    });
+}
+
+scanshade_status scanshade_relief_size(const scanshade_relief_maps* maps, int32_t* width, int32_t* height) {
+    return guarded([&] {
+        require(maps, "maps");
+        require(width, "width");
+        require(height, "height");
+        const cv::Size size = maps->result.maps.front().values.size();
+        *width = size.width, *height = size.height;
+    });
+}
+
+const float* scanshade_relief_map(const scanshade_relief_maps* maps, const char* name) {
+    if (!maps || !name)
+        return nullptr;
+    const auto found = std::ranges::find(maps->result.maps, name, &relief::NamedMap::name);
+    return found == maps->result.maps.end() ? nullptr : found->values.ptr<float>();
+}
+
+const char* scanshade_relief_info(const scanshade_relief_maps* maps) {
+    return maps ? maps->result.info.c_str() : nullptr;
+}
+void scanshade_relief_free(scanshade_relief_maps* maps) { delete maps; }
 
 } // extern "C"

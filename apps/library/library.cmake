@@ -5,7 +5,7 @@ set(library_dir ${PROJECT_SOURCE_DIR}/apps/library)
 
 file(GLOB library_sources CONFIGURE_DEPENDS ${library_dir}/*.cpp)
 add_library(library SHARED ${library_sources})
-target_link_libraries(library PRIVATE apps_session apps_refine)
+target_link_libraries(library PRIVATE apps_session apps_refine apps_relief)
 target_precompile_headers(library REUSE_FROM precompiled)
 target_include_directories(library INTERFACE $<BUILD_INTERFACE:${library_dir}/include>
                                              $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)

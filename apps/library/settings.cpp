@@ -60,6 +60,15 @@ json listed(std::string_view owner, const std::vector<Stage>& stages) {
     return list;
 }
 
+/// Points become no surface here: of "input", the band alone.
+std::vector<Stage> relief_stages(relief::ReliefSettings& settings, bool of_file) {
+    std::vector<Stage> stages = settings.stages();
+    for (Stage& stage : stages)
+        if (stage.title == "input")
+            std::erase_if(stage.rows, [&](const Parameter& row) { return !of_file || row.name != "band"; });
+    return stages;
+}
+
 } // namespace
 
 std::vector<Stage> stages_for(Purpose purpose, RunSettings& settings) {
@@ -101,6 +110,13 @@ void fill(RefineSettings& settings, const Settings& given) {
         set(row_of(name, rows, stages, "refine"), value);
 }
 
+void fill(relief::ReliefSettings& settings, bool of_file, const Settings& given) {
+    const std::vector<Parameter> rows = rows_of(relief_stages(settings, of_file));
+    for (const auto& [name, value] : given)
+        set(row_of(name, rows, settings.stages(), "relief"), value);
+    settings.resolve();
+}
+
 json values_in_use(RunSettings& settings) {
     const std::vector<Stage> taken = stages_for(Purpose::session, settings);
     const std::vector<Parameter> rows = rows_of(taken);
@@ -119,6 +135,9 @@ json all_settings() {
     for (json& one : listed("capture", stages_for(Purpose::capture, settings)))
         list.push_back(std::move(one));
     for (json& one : listed("refine", refine.stages()))
+        list.push_back(std::move(one));
+    relief::ReliefSettings relief;
+    for (json& one : listed("relief", relief_stages(relief, true)))
         list.push_back(std::move(one));
     return list;
 }

@@ -4,6 +4,7 @@
 #include "apps/json.h"
 #include "apps/method_settings.h"
 #include "apps/refine/refine.h"
+#include "apps/relief/settings.h"
 #include "apps/session/settings.h"
 
 namespace scanshade::library {
@@ -18,11 +19,13 @@ enum class Purpose { session, capture };
 /// setting that is unknown, is one of the program alone, or is out of range.
 void fill(RunSettings& settings, Purpose purpose, const Settings& given);
 void fill(RefineSettings& settings, const Settings& given);
+/// `of_file`: the heights are a file's, so that its band may be named.
+void fill(relief::ReliefSettings& settings, bool of_file, const Settings& given);
 
 /// {"radius": 0.5, "cacao.power": 1.5, ...}: those in use that shape a session's results.
 [[nodiscard]] json values_in_use(RunSettings& settings);
 
-/// Every setting of sessions, captures and refine as scanshade_settings() has it.
+/// Every setting of sessions, captures, refine and relief as scanshade_settings() has it.
 [[nodiscard]] json all_settings();
 
 } // namespace scanshade::library

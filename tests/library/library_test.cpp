@@ -2,6 +2,7 @@
 #include <bit>
 #include <cstdint>
 #include <scanshade/capture.h>
+#include <scanshade/relief.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -180,6 +181,42 @@ TEST_F(LibraryTest, mistakes_get_the_programs_own_sentence) {
         EXPECT_NE(std::string(error.what()).find("320x240"), std::string::npos);
     }
     EXPECT_THROW(scanshade::Capture("/nowhere"), scanshade::Error);
+}
+
+/// The same DEM as a file for the program and as an array; its cells are of 1 m without a word on their place.
+TEST_F(LibraryTest, relief_has_the_bits_that_the_program_writes) {
+    const fs::path folder = fs::path(testing::TempDir()) / "library_relief";
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+    cv::Mat1f heights(60, 80);
+    cv::randu(heights, 300, 303);
+    heights(20, 30) = NAN;
+    const fs::path dem = folder / "dem.tif";
+    ASSERT_TRUE(cv::imwrite(dem.string(), heights));
+    const std::string words =
+        " relief " + dem.string() + " --write svf,openness-neg,ao --radius 5 -q -o " + folder.string();
+    ASSERT_EQ(std::system((SCANSHADE_PROGRAM + words + " 2> /dev/null").c_str()), 0);
+    const std::vector<std::string> names{"svf", "openness-neg", "ao"};
+    const auto maps = scanshade::relief(heights, 1, names, {{"radius", "5"}}),
+               of_file = scanshade::relief(dem.string(), names, {{"radius", "5"}});
+    for (const auto& [name, file] : {std::pair("svf", "dem_SVF_R5_D16.tif"), std::pair("ao", "dem_AO_R5.tif"),
+                                     std::pair("openness-neg", "dem_OPEN-NEG_R5_D16.tif")}) {
+        const cv::Mat1f written = cv::imread((folder / file).string(), cv::IMREAD_UNCHANGED);
+        expect_same_bits(maps.at(name), written);
+        expect_same_bits(of_file.at(name), written);
+    }
+    const auto refusal = [&](double cell, const scanshade::Settings& settings) {
+        try {
+            (void)scanshade::relief(heights, cell, {"svf"}, settings);
+        } catch (const scanshade::Error& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_NE(refusal(0, {}).find("cells of 0 m"), std::string::npos);
+    EXPECT_NE(refusal(1, {{"surface", "top"}}).find("is a setting of the program, not of relief"), std::string::npos);
+    EXPECT_NE(refusal(1, {{"radius", "0.1"}}).find("a radius of 0.1"), std::string::npos);
+    EXPECT_THROW((void)scanshade::relief((folder / "none.tif").string(), {"svf"}), scanshade::Error);
 }
 
 TEST(CInterface, works_from_c) { EXPECT_EQ(one_image_in_c(), 0); }

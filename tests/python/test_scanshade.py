@@ -3,6 +3,7 @@
 import os
 import pickle
 import resource
+import struct
 import subprocess
 import threading
 
@@ -286,6 +287,53 @@ def test_doubts_are_warnings_at_the_callers_line():
     assert result.doubts and told[0].filename == __file__
     with pytest.warns(scanshade.Doubt, match="5 points cannot show a surface"):
         scanshade.point_ambient_occlusion(np.random.default_rng(1).random((5, 3)))
+
+
+def write_dem(path, heights):
+    """float32 as a TIFF of one strip, without a place on the map: cells of 1 m."""
+    tags = [(256, 4, heights.shape[1]), (257, 4, heights.shape[0]), (258, 3, 32), (259, 3, 1), (262, 3, 1), (273, 4, 8 + 2 + 120 + 4),
+            (277, 3, 1), (278, 4, heights.shape[0]), (279, 4, heights.nbytes), (339, 3, 3)]  # fmt: skip
+    entries = b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in tags)
+    path.write_bytes(b"II*\0\x08\0\0\0" + struct.pack("<H", len(tags)) + entries + bytes(4) + heights.tobytes())
+
+
+@pytest.mark.parametrize("profile", ["exact", "rvt"])
+def test_relief_has_the_bits_that_the_program_writes(tmp_path, profile):
+    heights = np.random.default_rng(1).uniform(300, 303, (60, 80)).astype(np.float32)
+    heights[20, 30] = np.nan
+    write_dem(tmp_path / "dem.tif", heights)
+    run("relief", tmp_path / "dem.tif", "-o", tmp_path, "--write", "svf,openness-neg,dominance,ao", "--radius", 5,
+        "--profile", profile)  # fmt: skip
+    names = {"svf": "SVF_R5_D16", "openness-neg": "OPEN-NEG_R5_D16", "ao": "AO_R5", "dominance": "LD_R_M10-20_DI1_A15_OH1.7"}
+    maps = scanshade.relief(heights, cell=1, write=list(names), radius=5, profile=profile)
+    assert list(maps) == list(names) and maps.info["cell"] == 1
+    with pytest.warns(scanshade.Doubt, match="metres are assumed"):
+        of_file = scanshade.relief(tmp_path / "dem.tif", write=",".join(names), radius=5, profile=profile)
+    for name, file in names.items():
+        with pytest.warns(scanshade.Doubt):
+            written = scanshade.relief(tmp_path / f"dem_{file}.tif", write="dtm")["dtm"]
+        for values in (maps[name], of_file[name]):
+            assert values.dtype == np.float32 and np.isnan(values[20, 30])
+            assert np.array_equal(values.view(np.uint32), written.view(np.uint32))
+
+
+def test_relief_takes_other_arrays_and_refuses_what_is_none():
+    plane = 1000 + 0.25 * np.add.outer(np.arange(40), np.arange(50))
+    for heights in (plane, plane[::-1].T, (4 * plane).astype(np.int32), plane.tolist()):
+        maps = scanshade.relief(heights, cell=2, write=["openness"])
+        assert maps["openness"].shape == np.shape(heights)
+        assert np.allclose(maps["openness"], 90, atol=0.02)
+    for call, part in [
+        (lambda: scanshade.relief(plane), "cell: the side"),
+        (lambda: scanshade.relief(plane[0], cell=1), "expected (H, W)"),
+        (lambda: scanshade.relief(plane, cell=-1), "cells of -1 m"),
+        (lambda: scanshade.relief(plane, cell=1, write="sfv"), "did you mean svf"),
+        (lambda: scanshade.relief(plane, cell=1, write="svf,points"), "of the program"),
+        (lambda: scanshade.relief("/nowhere.tif"), "/nowhere.tif"),
+    ]:
+        with pytest.raises(scanshade.Error) as error:
+            call()
+        assert part in str(error.value)
 
 
 def test_names_and_help_are_for_people():

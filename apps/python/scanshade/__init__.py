@@ -1,4 +1,4 @@
-"""Ambient occlusion for recorded depth images and point clouds.
+"""Ambient occlusion for recorded depth images and point clouds, and sky view of height fields.
 
 Conventions: x right, y down, z forward; metres; depth is z along the optical axis, 0 = hole; pixel centres at integers;
 poses are world_from_camera. Ambient occlusion is visibility: 1 = open, 0 = closed, NaN = no surface.
@@ -24,8 +24,8 @@ from . import _c
 from ._c import Error
 
 __all__ = [
-    "Capture", "Doubt", "Error", "Frame", "Result", "Session", "ambient_occlusion", "devices", "open", "point_ambient_occlusion",
-    "refine_camera", "settings",
+    "Capture", "Doubt", "Error", "Frame", "ReliefMaps", "Result", "Session", "ambient_occlusion", "devices", "open",
+    "point_ambient_occlusion", "refine_camera", "relief", "settings",
 ]  # fmt: skip
 __version__: str = _c.text("version")
 
@@ -496,8 +496,75 @@ def refine_camera(
     return _matrix(camera), report
 
 
+class ReliefMaps(dict[str, np.ndarray]):
+    """Maps by name, read-only float32 (H, W), NaN = no data, and `info`: cell, x0, y0 (north-west corner), unit_m, epsg, notes."""
+
+    def __init__(self, handle: _c.Handle) -> None:
+        self.info: dict[str, Any] = json.loads(_c.text("relief_info", handle.value))
+        shape = (self.info["height"], self.info["width"])
+        for name in self.info["maps"]:
+            address = _c.library.scanshade_relief_map(handle.value, name.encode())
+            values = _view(address, shape, np.float32, handle)
+            assert values is not None
+            self[name] = values
+
+
+def relief(
+    dem: Union[np.ndarray, str, os.PathLike[str]],
+    cell: Optional[float] = None,
+    *,
+    write: Union[str, Sequence[str]] = "svf",
+    **settings: Optional[Value],
+) -> ReliefMaps:
+    """Sky view, openness, dominance and AO of heights seen from above: a dict of float32 (H, W) by the names in `write`.
+
+    dem:      (H, W) heights in metres, rows from north to south, columns from west to east, not finite = no data; integers, too.
+              Or the path of a GeoTIFF or .vrt, which has its own units and place
+    cell:     side of a cell in metres; None for a path
+    write:    names of maps, in a list or between commas: svf and asvf (0 .. 1), openness and openness-neg (degrees, 90 on a
+              plane), dominance (1 on a level plane), ao (visibility, 1 = open), dtm (heights), source (0 = no data, 1 = measured)
+    settings: of `scanshade relief`, by name: radius=10 (m; 0 = 10 cells), directions=16, definition="horizontal", profile="rvt"
+
+    Values have the bits that the program writes. Raises Error for wrong shapes, types, files and settings. Warns (Doubt) of what
+    a file leaves open.
+
+    >>> maps = scanshade.relief(heights, cell=0.5, write=["svf", "openness"], radius=10)
+    >>> maps["svf"]
+    """
+    names = write if isinstance(write, str) else ",".join(write)
+    given = _settings({"write": names, **settings})
+    if isinstance(dem, (str, os.PathLike)):
+        if cell is not None:
+            raise Error(f"cell: {cell} given, but {os.fspath(dem)} has its own")
+        asked = _c.Heights(path=os.fsencode(dem))
+    else:
+        heights = _array(dem)
+        if heights.ndim != 2 or 0 in heights.shape:
+            raise Error(f"dem: shape {heights.shape} given, expected (H, W)")
+        if heights.dtype.kind not in "iuf":
+            raise Error(f"dem: {heights.dtype} given, expected numbers")
+        if cell is None:
+            raise Error("cell: the side of a cell in metres is needed")
+        if heights.dtype not in (np.float32, np.float64):
+            heights = heights.astype(np.float32 if heights.dtype == np.float16 else np.float64)
+        if heights.strides[1] != heights.itemsize or heights.strides[0] <= 0:
+            heights = np.ascontiguousarray(heights)
+        asked = _c.Heights(
+            values=heights.ctypes.data,
+            type=_c.FLOAT32 if heights.dtype == np.float32 else _c.FLOAT64,
+            width=heights.shape[1],
+            height=heights.shape[0],
+            row_bytes=heights.strides[0],
+            cell=float(cell),
+        )
+    maps = ReliefMaps(_c.Handle("relief_free", "relief", c.byref(asked), given, len(given)))
+    for note in maps.info["notes"]:
+        warnings.warn(note, Doubt, stacklevel=_callers_level())
+    return maps
+
+
 def settings() -> list[dict[str, Any]]:
-    """Every setting of sessions, captures and refine_camera: for, name, help, default, unit, low, high, choices."""
+    """Every setting of sessions, captures, refine_camera and relief: for, name, help, default, unit, low, high, choices."""
     return json.loads(_c.text("settings"))
 
 

@@ -95,6 +95,17 @@ class FrameData(Sized):
     ]
 
 
+class Heights(Sized):
+    _fields_ = [
+        ("size", c.c_size_t),
+        ("values", c.c_void_p),
+        *[(name, c.c_int32) for name in ("type", "width", "height")],
+        ("row_bytes", c.c_int64),
+        ("cell", c.c_double),
+        ("path", c.c_char_p),
+    ]
+
+
 CONFIDENCE, NORMALS = 1, 2
 UINT16, FLOAT32, FLOAT64 = 1, 2, 3
 _KINDS = {1: "misuse", 2: "bad input", 4: "outage", 5: "internal"}
@@ -139,6 +150,10 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "refinement_summary": (_text, [_handle]),
     "refinement_trajectory": (_text, [_handle]),
     "refinement_free": (None, [_handle]),
+    "relief": (c.c_int, [c.POINTER(Heights), c.POINTER(Setting), c.c_size_t, _out]),
+    "relief_map": (c.c_void_p, [_handle, _text]),
+    "relief_info": (_text, [_handle]),
+    "relief_free": (None, [_handle]),
 }
 for _name, (_result, _arguments) in _SIGNATURES.items():
     _function = getattr(library, f"scanshade_{_name}")

@@ -66,8 +66,8 @@ typedef struct scanshade_setting {
     const char* value;
 } scanshade_setting;
 
-/* A JSON array of all settings: {"for": "session" | "capture" | "refine", "stage", "name", "help", "default", "unit",
- * "low", "high", "choices"}. Lives for ever. */
+/* A JSON array of all settings: {"for": "session" | "capture" | "refine" | "relief", "stage", "name", "help",
+ * "default", "unit", "low", "high", "choices"}. Lives for ever. */
 SCANSHADE_API const char* scanshade_settings(void);
 
 /* A JSON array of the Vulkan devices: {"index", "name", "kind", "driver", "api", "unusable"}. The text lives until the
@@ -251,6 +251,38 @@ SCANSHADE_API const char* scanshade_refinement_summary(const scanshade_refinemen
 /* Refined poses of a recording, as lines of TUM's format; a comment alone without any. */
 SCANSHADE_API const char* scanshade_refinement_trajectory(const scanshade_refinement* refinement);
 SCANSHADE_API void scanshade_refinement_free(scanshade_refinement* refinement);
+
+/* ------------------------------------------------------------------------------------------------------ relief */
+
+/* Heights seen from above, in rows from north to south and columns from west to east: an array, or a file. They are
+ * only read, and not after the call. */
+typedef struct scanshade_heights {
+    size_t size;
+    const void* values;    /* FLOAT32 or FLOAT64, metres; not finite, or beyond 1e30 = no data */
+    int32_t type;          /* scanshade_type */
+    int32_t width, height; /* cells */
+    int64_t row_bytes;     /* from one row to the next; 0 = rows are packed */
+    double cell;           /* side of a cell, metres */
+    const char* path;      /* a GeoTIFF or .vrt in place of the array; NULL = none */
+} scanshade_heights;
+#define SCANSHADE_HEIGHTS_INIT                                                                                         \
+    { sizeof(scanshade_heights), NULL, SCANSHADE_FLOAT32, 0, 0, 0, 1, NULL }
+
+typedef struct scanshade_relief_maps scanshade_relief_maps;
+
+/* Maps as the program's `relief` computes them, with its settings: write (names of maps), radius (metres; 0 = 10
+ * cells), directions, definition, profile, and others. Those of points and files of results belong to the program. */
+SCANSHADE_API scanshade_status scanshade_relief(const scanshade_heights* heights, const scanshade_setting* settings,
+                                                size_t count, scanshade_relief_maps** maps);
+SCANSHADE_API scanshade_status scanshade_relief_size(const scanshade_relief_maps* maps, int32_t* width,
+                                                     int32_t* height);
+/* height x width floats of the map of that name ("svf", "openness-neg"), packed; NaN = no data. NULL for a map that was
+ * not asked for. They live as long as the handle. */
+SCANSHADE_API const float* scanshade_relief_map(const scanshade_relief_maps* maps, const char* name);
+/* A JSON object: "maps" (names), "width", "height", "cell", "x0" and "y0" (the north-west corner, in the unit of the
+ * coordinates), "unit_m", "epsg" (0 = none is named), "notes" (sentences: what was assumed). */
+SCANSHADE_API const char* scanshade_relief_info(const scanshade_relief_maps* maps);
+SCANSHADE_API void scanshade_relief_free(scanshade_relief_maps* maps);
 
 #ifdef __cplusplus
 }
