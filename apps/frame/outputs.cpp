@@ -67,6 +67,8 @@ std::vector<fs::path> files_of(const CaptureEntry& entry, const Outputs& outputs
     if (!entry.cloud.empty() && of_points(outputs).cloud)
         for (const std::string_view extension : written_cloud_extensions())
             add(cloud_file(entry.name, std::string(extension)));
+    if (const std::string plain = plain_laz_name(entry.name); !entry.cloud.empty() && plain != entry.name)
+        add(cloud_file(plain, ".laz"));
     return files;
 }
 

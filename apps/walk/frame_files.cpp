@@ -170,7 +170,7 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
     if (outputs.error && work.by_points && work.error.per_point.empty())
         work.row.warnings.push_back("the method estimates no errors of single points, so there is no field ao_error.");
     if (work.frame.cloud && outputs.cloud)
-        wrote(cloud_file(name, extension(*work.frame.cloud->records)),
+        wrote(cloud_file(written_name(name, *work.frame.cloud->records), ""),
               [&](const auto& file) { write_recorded_cloud(file, work, points_of_cloud(work, outputs), outputs); });
     if (!work.frame.cloud && outputs.depth_cloud)
         wrote(cloud_file(name, ".ply"), [&](const auto& file) {

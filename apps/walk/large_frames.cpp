@@ -163,12 +163,14 @@ void compute_large(Work& work, PointMethod& method) {
         work.row.notes.push_back(fmt::format("coordinates are in {}.", unit));
     std::ranges::copy(found.notes, std::back_inserter(work.row.notes));
     std::ranges::copy(found.doubts, std::back_inserter(work.row.doubts));
+    if (!records.octree_damage.empty())
+        work.row.doubts.push_back(records.octree_damage);
 }
 
 void write_large(Work& work, const Outputs& outputs) {
     const CloudRecords& records = work.large->file(work.large_file).records();
     std::optional<std::filesystem::path> target;
-    const std::filesystem::path file = cloud_file(work.entry.name, extension(records));
+    const std::filesystem::path file = cloud_file(written_name(work.entry.name, records), "");
     if (outputs.cloud)
         target = outputs.files_folder() / file;
     LargeCloudRun::Colours colours;

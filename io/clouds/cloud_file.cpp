@@ -498,9 +498,10 @@ std::string describe(const CloudRecords& records) {
     const std::string grid =
         records.grid.height > 1 ? fmt::format(", {}x{} organised", records.grid.width, records.grid.height) : "";
     const char* const what = splat_fields(records) ? "Gaussian splat" : "point";
-    return fmt::format("{}{}, {}{}, fields{}{}", records.format->name, as_read ? " " + encoding_name(records) : "",
-                       counted(records.point_count, what), grid, names,
-                       records.unit.empty() ? "" : ", in " + records.unit);
+    return fmt::format(
+        "{}{}{}, {}{}, fields{}{}", records.format->name, as_read ? " " + encoding_name(records) : "",
+        records.octree.empty() ? "" : fmt::format(", COPC of {}", counted(records.octree.size(), "node")),
+        counted(records.point_count, what), grid, names, records.unit.empty() ? "" : ", in " + records.unit);
 }
 
 std::string unit_of(const CloudRecords& records) { return records.unit; }
@@ -528,5 +529,11 @@ bool is_on_a_map(const Cloud& cloud) {
 bool z_is_up(const Cloud& cloud) { return (cloud.records && cloud.records->format->z_up) || is_on_a_map(cloud); }
 
 std::string extension(const CloudRecords& records) { return std::string(written_extension(*records.format)); }
+
+std::string written_name(const std::string& name, const CloudRecords& records) {
+    const bool plain_laz =
+        records.encoding == Encoding::compressed && extension(records) == ".laz" && records.octree.empty();
+    return (plain_laz ? plain_laz_name(name) : name) + extension(records);
+}
 
 } // namespace scanshade

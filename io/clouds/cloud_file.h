@@ -58,5 +58,8 @@ void write_new_ply(const std::filesystem::path& file, const std::vector<Eigen::V
 [[nodiscard]] bool z_is_up(const Cloud& cloud);
 /// ".pcd", ".ply", ".las" ..., as read; what was read without a header is written as ".ply".
 [[nodiscard]] std::string extension(const CloudRecords& records);
+/// The file that write_cloud() makes of a cloud called `name`: with extension(), and `.plain` in place of a `.copc`
+/// that would not be true.
+[[nodiscard]] std::string written_name(const std::string& name, const CloudRecords& records);
 
 } // namespace scanshade

@@ -61,8 +61,10 @@ struct CloudRecords {
     std::string after; ///< faces, other elements, left-over lines
     std::array<double, 3> scale{1, 1, 1}, shift{0, 0, 0}; ///< coordinates are field values times scale plus shift
     std::vector<Eigen::Vector3d> placed;                  ///< the points, if fields alone do not give them
-    std::string unit;       ///< of the coordinates, and its source; empty: metres, by convention
-    double colour_step = 0; ///< the divisor of colours, where these are a part of the file; 0 = they tell it
+    std::string unit;               ///< of the coordinates, and its source; empty: metres, by convention
+    std::vector<laz::Chunk> octree; ///< COPC: the chunks as the file has them, its nodes; empty for other files
+    std::string octree_damage;      ///< COPC: a sentence on why the octree is not kept; empty where it is
+    double colour_step = 0;         ///< the divisor of colours, where these are a part of the file; 0 = they tell it
     std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera, if the PCD has one
 
     [[nodiscard]] bool text() const { return encoding == Encoding::ascii; }
@@ -195,15 +197,19 @@ struct CloudShape {
 /// What comes before the points in a LAS file whose points ended at `old_end`.
 [[nodiscard]] std::string las_head(const CloudRecords& records, const std::vector<FieldAddition>& additions,
                                    std::uint64_t old_end);
-/// What stands round the points of a LAZ file whose block of points ended at `old_end`.
+/// What stands round the points of a LAZ file whose block of points ended at `old_end`. COPC keeps its octree: the
+/// chunks `octree` are packed anew, each with its points.
 struct LazHead {
     std::string header, after;
     laz::Packing packing;
     std::uint64_t old_end;
+    std::vector<laz::Chunk> octree; ///< before; empty where there is none
 };
 [[nodiscard]] LazHead laz_head(const CloudRecords& records, const std::vector<FieldAddition>& additions,
                                std::uint64_t old_end);
-/// The header, once it is known where the new block ends.
-[[nodiscard]] std::string finished(LazHead head, std::uint64_t end);
+/// For the points between.
+[[nodiscard]] laz::Packer packer_of(const LazHead& head);
+/// Offsets in header and octree, which keep their lengths, once `packer` has all points.
+void finish(LazHead& head, const laz::Packer& packer);
 
 } // namespace scanshade

@@ -46,18 +46,13 @@ class Sink {
             if (done < 0)
                 fail();
             bytes.remove_prefix(static_cast<std::size_t>(done));
-            at_ += static_cast<std::uint64_t>(done);
         }
     }
-    /// Bytes written so far.
-    [[nodiscard]] std::uint64_t at() const { return at_; }
     /// In place of bytes that were written.
     void put_at(std::uint64_t place, std::string_view bytes) {
         if (::lseek(handle_, static_cast<off_t>(place), SEEK_SET) < 0)
             fail();
-        const std::uint64_t end = at_;
         put(bytes);
-        at_ = end;
     }
     void close() {
         if (::close(std::exchange(handle_, -1)) != 0)
@@ -67,7 +62,6 @@ class Sink {
   private:
     [[noreturn]] static void fail() { throw std::system_error(errno, std::generic_category()); }
     int handle_;
-    std::uint64_t at_ = 0;
 };
 
 std::vector<AddedField> added_fields(const std::vector<std::string>& names,
@@ -179,7 +173,7 @@ void CloudStream::write(const fs::path& target, const std::vector<std::string>& 
             begun = true;
             if (packs) {
                 laz = laz_head(all, edit.additions, shape_.end);
-                packer.emplace(laz->packing);
+                packer.emplace(packer_of(*laz));
                 sink.put(laz->header + std::string(8, '\0'));
                 return;
             }
@@ -203,10 +197,9 @@ void CloudStream::write(const fs::path& target, const std::vector<std::string>& 
         }
         if (packs) {
             sink.put(packer->finish());
-            const std::uint64_t end = sink.at(), block_at = laz->header.size();
+            finish(*laz, *packer);
             sink.put(laz->after);
-            sink.put_at(block_at, packer->table(block_at));
-            sink.put_at(0, finished(*std::move(laz), end));
+            sink.put_at(0, laz->header + packer->table(laz->header.size()));
             sink.close();
             return;
         }

@@ -158,6 +158,11 @@ std::string_view written_extension(const CloudFormat& format) {
     return format.written_extension.empty() ? format.extensions[0] : format.written_extension;
 }
 
+std::string plain_laz_name(const std::string& name) {
+    constexpr std::string_view copc = ".copc";
+    return lower_extension(name) == copc ? name.substr(0, name.size() - copc.size()) + ".plain" : name;
+}
+
 std::vector<std::string_view> written_cloud_extensions() {
     std::vector<std::string_view> extensions;
     for (const CloudFormat& format : formats)

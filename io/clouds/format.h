@@ -48,6 +48,8 @@ struct CloudFormat {
 [[nodiscard]] std::vector<std::string_view> cloud_format_names();
 /// Of the file that write_cloud() makes of a cloud in this format.
 [[nodiscard]] std::string_view written_extension(const CloudFormat& format);
+/// The name, without extension, of a LAZ that is no COPC: NAME.plain for NAME.copc, other names as they are.
+[[nodiscard]] std::string plain_laz_name(const std::string& name);
 /// Those of all formats.
 [[nodiscard]] std::vector<std::string_view> written_cloud_extensions();
 

@@ -2,6 +2,8 @@
 // bytes.
 #include "io/clouds/cloud_records.h"
 
+#include "io/clouds/format.h"
+#include "io/clouds/laz/copc.h"
 #include "io/clouds/laz/laz.h"
 #include "io/clouds/number_fields.h"
 #include "io/file_bytes.h"
@@ -235,9 +237,7 @@ std::size_t point_count(std::string_view bytes, int minor) {
 namespace {
 
 bool describes_laz(const Vlr& vlr) { return vlr.user == laz::record_user && vlr.id == laz::record_id; }
-bool is_copc(const std::vector<Vlr>& vlrs) {
-    return std::ranges::any_of(vlrs, [](const Vlr& vlr) { return vlr.user == "copc" && vlr.id == 1; });
-}
+bool describes_octree(const Vlr& vlr) { return vlr.user == laz::octree_user && vlr.id == laz::octree_id; }
 
 /// Where the block of points of a LAZ file ends at the latest.
 std::uint64_t points_end(std::string_view header, std::uint64_t points_at, std::uint64_t end) {
@@ -261,6 +261,7 @@ std::size_t unpack(CloudRecords& records, std::string_view bytes, std::size_t po
     const std::size_t end = points_end(records.header, points_at, bytes.size());
     laz::Unpacked unpacked = laz::unpacked(bytes, points_at, end, records.point_count, packing);
     records.points = std::move(unpacked.points);
+    records.octree = std::move(unpacked.chunks);
     records.packed = bytes.substr(points_at, unpacked.end - points_at);
     return unpacked.end;
 }
@@ -347,6 +348,71 @@ std::vector<Vlr> vlrs_of(const CloudRecords& records) {
                    read_at<std::uint32_t>(records.header, at_vlr_count));
 }
 
+/// The extended records behind the points, by offsets in `after`, which begins at `after_at` in the file.
+std::vector<Vlr> extended_of(std::string_view header, std::string_view after, std::uint64_t after_at) {
+    constexpr std::size_t extended_header = 60;
+    std::vector<Vlr> all;
+    if (read_at<std::uint8_t>(header, at_minor) < 4)
+        return all;
+    const auto first = read_at<std::uint64_t>(header, at_evlrs);
+    std::uint64_t at = first - after_at;
+    for (auto left = read_at<std::uint32_t>(header, at_evlr_count); left > 0 && first >= after_at; --left) {
+        if (at > after.size() || after.size() - at < extended_header)
+            break;
+        const auto length = read_at<std::uint64_t>(after, at + 20);
+        if (length > after.size() - at - extended_header)
+            break;
+        all.push_back({fixed_text(after, at + 2, 16), after.substr(at + extended_header, length),
+                       read_at<std::uint16_t>(after, at + 18), at});
+        at += extended_header + length;
+    }
+    return all;
+}
+
+/// Where COPC keeps its octree: the first record, and the hierarchy behind the points. Throws Error where one is not
+/// as COPC 1.0 wants it.
+struct OctreePlace {
+    std::size_t info = 0;      ///< of the record's body in the header
+    std::size_t hierarchy = 0; ///< of the extended record's body in `after`
+    std::size_t size = 0;
+};
+OctreePlace octree_place(std::string_view header, std::string_view after, std::uint64_t after_at) {
+    constexpr std::size_t first = 375; // the end of a header of LAS 1.4
+    const auto vlrs = vlrs_of(header, first, 1);
+    if (read_at<std::uint16_t>(header, at_header_size) != first || vlrs.empty() || !describes_octree(vlrs[0]) ||
+        vlrs[0].data.size() != laz::octree_info_size)
+        throw Error(fmt::format("its record of {} bytes is not the first, at byte {}", laz::octree_info_size, first));
+    if (const int format = read_at<std::uint8_t>(header, at_format) & format_mask; format < 6)
+        throw Error(fmt::format("point format {}, expected 6 .. 8", format));
+    for (const Vlr& vlr : extended_of(header, after, after_at))
+        if (vlr.user == laz::octree_user && vlr.id == laz::hierarchy_id)
+            return {first + vlr_header, static_cast<std::size_t>(vlr.data.data() - after.data()), vlr.data.size()};
+    throw Error("no hierarchy is among the records behind the points");
+}
+
+/// Keeps the chunks as COPC's octree where they are one, and says so where they only should be.
+void take_octree(CloudRecords& records, std::vector<laz::Chunk> chunks, std::uint64_t after_at, const fs::path& file,
+                 std::vector<std::string>& warnings) {
+    records.octree.clear();
+    const auto vlrs = vlrs_of(records);
+    if (std::ranges::none_of(vlrs, describes_octree)) {
+        if (plain_laz_name(file.stem().string()) != file.stem().string())
+            warnings.push_back(file.string() + ": the name says COPC, but the file is plain LAZ; so is the one with "
+                                               "fields added, under another name.");
+        return;
+    }
+    try {
+        const OctreePlace place = octree_place(records.header, records.after, after_at);
+        check_octree(records.header.substr(place.info, laz::octree_info_size),
+                     {records.after.substr(place.hierarchy, place.size), after_at + place.hierarchy}, chunks);
+        records.octree = std::move(chunks);
+    } catch (const Error& failure) {
+        records.octree_damage = fmt::format("the octree of this COPC is damaged: {}. The points are read as LAZ has "
+                                            "them, and written as plain LAZ.",
+                                            failure.what());
+    }
+}
+
 } // namespace
 
 CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
@@ -356,14 +422,12 @@ CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<
     if (compressed) {
         records.encoding = CloudRecords::Encoding::compressed;
         during(file.string(), [&, at = points_at, &to = records] { end = unpack(to, bytes, at, vlrs); });
-        if (is_copc(vlrs))
-            warnings.push_back(file.string() +
-                               ": COPC is read as a whole, its octree is not used; with fields added it "
-                               "is written as plain LAZ.");
     } else {
         records.points = bytes.substr(points_at, records.point_count * records.stride);
     }
     records.after = bytes.substr(end);
+    if (compressed)
+        take_octree(records, std::move(records.octree), end, file, warnings);
     doubt_box(records, records.header, file, warnings);
     return std::move(records);
 }
@@ -416,9 +480,8 @@ CloudShape las_shape(const FileBytes& file, std::vector<std::string>& warnings) 
             shape.reference += vlr.data;
     if (head.compressed)
         during(file.path().string(), [&] { find_chunks(shape, file); });
-    if (is_copc(vlrs_of(shape.records)))
-        warnings.push_back(file.path().string() +
-                           ": COPC's octree is not used; with fields added it is written as plain LAZ.");
+    if (head.compressed && shape.whole_since.empty())
+        take_octree(shape.records, shape.chunks, shape.end, file.path(), warnings);
     return shape;
 }
 
@@ -508,11 +571,13 @@ void replace_data(std::string& header, const Vlr& vlr, const std::string& data) 
     put(header, vlr.begin + 20, static_cast<std::uint16_t>(data.size()));
 }
 
-/// The record that describes LAZ follows the longer records; the octree of COPC, which points into the old chunks,
-/// goes.
-laz::Packing describe_packing(std::string& header, std::size_t length) {
+/// The record that describes LAZ follows the longer records. An octree that is not kept points into the old chunks,
+/// and goes.
+laz::Packing describe_packing(std::string& header, std::size_t length, bool keeps_octree) {
     const std::size_t first = read_at<std::uint16_t>(header, at_header_size);
-    const auto packing = laz::usual_packing(read_at<std::uint8_t>(header, at_format) & format_mask, length);
+    auto packing = laz::usual_packing(read_at<std::uint8_t>(header, at_format) & format_mask, length);
+    if (keeps_octree)
+        packing.chunk_points = laz::varying_chunks;
     const auto count = read_at<std::uint32_t>(header, at_vlr_count);
     std::string copy = header;
     for (const Vlr& vlr : vlrs_of(copy, first, count))
@@ -520,7 +585,7 @@ laz::Packing describe_packing(std::string& header, std::size_t length) {
             replace_data(header, vlr, laz::described(packing));
     copy = header;
     for (const Vlr& vlr : vlrs_of(copy, first, count))
-        if (vlr.user == "copc") {
+        if (describes_octree(vlr) && !keeps_octree) {
             header.erase(vlr.begin, vlr_header + vlr.data.size());
             put(header, at_vlr_count, count - 1);
             break; // it has one, and it is the first
@@ -530,24 +595,15 @@ laz::Packing describe_packing(std::string& header, std::size_t length) {
 
 /// Without the hierarchy of COPC among the records behind the points.
 std::string without_octree(std::string& header, std::string after, std::size_t block_end) {
-    constexpr std::size_t evlr_header = 60;
-    const auto first = read_at<std::uint64_t>(header, at_evlrs);
-    auto count = read_at<std::uint32_t>(header, at_evlr_count);
-    if (first < block_end)
-        return after;
-    std::uint64_t at = first - block_end;
-    for (std::uint32_t i = 0, all = count; i < all && at <= after.size() && after.size() - at >= evlr_header; ++i) {
-        const auto length = read_at<std::uint64_t>(after, at + 20);
-        if (length > after.size() - at - evlr_header)
-            break;
-        if (fixed_text(after, at + 2, 16) == "copc") {
-            after.erase(at, evlr_header + length);
-            --count;
-        } else {
-            at += evlr_header + length;
+    const std::string copy = after;
+    auto extended = extended_of(header, copy, block_end);
+    std::ranges::reverse(extended);
+    for (const Vlr& vlr : extended)
+        if (vlr.user == laz::octree_user) {
+            const auto end = static_cast<std::size_t>(vlr.data.data() - copy.data()) + vlr.data.size();
+            after.erase(vlr.begin, end - vlr.begin);
+            put(header, at_evlr_count, read_at<std::uint32_t>(header, at_evlr_count) - 1);
         }
-    }
-    put(header, at_evlr_count, count);
     return after;
 }
 
@@ -600,22 +656,38 @@ std::string las_head(const CloudRecords& records, const std::vector<FieldAdditio
 }
 
 LazHead laz_head(const CloudRecords& records, const std::vector<FieldAddition>& additions, std::uint64_t old_end) {
-    LazHead head{described_header(records, additions), records.after, {}, old_end};
-    head.packing = describe_packing(head.header, read_at<std::uint16_t>(head.header, at_length));
-    if (read_at<std::uint8_t>(head.header, at_minor) >= 4)
+    LazHead head{described_header(records, additions), records.after, {}, old_end, records.octree};
+    const bool keeps_octree = !records.octree.empty();
+    head.packing = describe_packing(head.header, read_at<std::uint16_t>(head.header, at_length), keeps_octree);
+    if (!keeps_octree)
         head.after = without_octree(head.header, std::move(head.after), old_end);
     put(head.header, at_points, static_cast<std::uint32_t>(head.header.size()));
     return head;
 }
 
-std::string finished(LazHead head, std::uint64_t end) {
+laz::Packer packer_of(const LazHead& head) {
+    std::vector<std::uint32_t> counts;
+    for (const laz::Chunk& chunk : head.octree)
+        counts.push_back(static_cast<std::uint32_t>(chunk.count));
+    return laz::Packer(head.packing, std::move(counts));
+}
+
+void finish(LazHead& head, const laz::Packer& packer) {
+    const std::uint64_t begin = head.header.size(), end = begin + packer.size();
+    if (!head.octree.empty()) {
+        const OctreePlace place = octree_place(head.header, head.after, head.old_end);
+        std::string info = head.header.substr(place.info, laz::octree_info_size);
+        laz::Hierarchy hierarchy{head.after.substr(place.hierarchy, place.size), head.old_end + place.hierarchy};
+        move_octree(info, hierarchy, end + place.hierarchy, head.octree, packer.chunks(begin));
+        head.header.replace(place.info, info.size(), info);
+        head.after.replace(place.hierarchy, place.size, hierarchy.pages);
+    }
     shift_offsets(head.header, head.old_end, end);
-    return std::move(head.header);
 }
 
 std::string las_bytes(const CloudRecords& records, std::string points, const std::vector<FieldAddition>& additions) {
     const bool compressed = records.encoding == CloudRecords::Encoding::compressed;
-    if (compressed && additions.empty() && points == records.points)
+    if (compressed && additions.empty() && points == records.points && records.octree_damage.empty())
         return between(records.header, records.packed, records.after);
     if (!compressed && additions.empty())
         return between(records.header, std::move(points), records.after);
@@ -623,8 +695,9 @@ std::string las_bytes(const CloudRecords& records, std::string points, const std
         return las_head(records, additions, records.header.size() + records.stride * records.point_count) + points +
                records.after;
     LazHead head = laz_head(records, additions, records.header.size() + records.packed.size());
-    points = laz::packed(points, head.header.size(), head.packing);
-    shift_offsets(head.header, head.old_end, head.header.size() + points.size());
+    laz::Packer packer = packer_of(head);
+    points = laz::packed(points, head.header.size(), packer);
+    finish(head, packer);
     return head.header + points + head.after;
 }
 

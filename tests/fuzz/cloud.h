@@ -46,6 +46,7 @@ inline void take_cloud(std::string_view bytes, const std::string& name) {
     const Cloud again = read_cloud(more, warnings);
     must_hold(again.points.size() == cloud.points.size());
     must_hold(again.grid == cloud.grid);
+    must_hold(again.records->octree.size() == cloud.records->octree.size());
     must_hold(text || recorded_field(again, "ambient_occlusion", more).size() == values.size());
 }
 

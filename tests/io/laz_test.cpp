@@ -274,24 +274,6 @@ TEST(Laz, unusual_containers_are_read) {
     EXPECT_EQ(hex(read(write_file(folder / "bare.laz", bare)).records->points), hex(records));
 }
 
-TEST(Laz, copc_is_read_whole_and_written_as_plain_laz) {
-    const TemporaryFolder folder;
-    std::vector<std::string> warnings;
-    const Cloud cloud = read_cloud(write_file(folder / "a.copc.laz", copc_file()), warnings);
-    EXPECT_EQ(hex(cloud.records->points), hex(twelve_records(7)));
-    EXPECT_TRUE(warned(warnings, "COPC is read as a whole"));
-    const std::vector<float> values(12, 0.5F);
-    write_cloud(folder / "b.laz", cloud, {{"ambient_occlusion", values}});
-    const std::string after = file_bytes(folder / "b.laz");
-    EXPECT_EQ(after.find("copc"), std::string::npos) << "an octree that points nowhere";
-    EXPECT_EQ(after.substr(load<std::uint64_t>(after.data() + 235) + 60), "kept");
-    warnings.clear();
-    const Cloud back = read_cloud(folder / "b.laz", warnings);
-    EXPECT_FALSE(warned(warnings, "COPC"));
-    for (std::size_t i = 0; i < 12; ++i)
-        EXPECT_EQ(hex(back.records->record(i).substr(0, 40)), hex(cloud.records->record(i)));
-}
-
 std::string refused(const fs::path& file, const std::string& bytes) {
     std::vector<std::string> warnings;
     return refusal([&] { (void)read_cloud(write_file(file, bytes), warnings); });

@@ -97,7 +97,8 @@ def cloud(file, rows, out):
     if ours.shape != theirs.shape:
         return False, f"{len(ours)} points, {len(theirs)} theirs"
     worst = float(np.abs(ours - theirs).max()) if len(ours) else 0.0
-    return worst < 1e-6, f"{len(ours)} points, worst difference {worst:.1e}"
+    nodes = f" in {rows[0]['nodes']} nodes with {', '.join(rows[0]['added']) or 'nothing added'}" if "nodes" in rows[0] else ""
+    return worst < 1e-6, f"{len(ours)} points{nodes}, worst difference {worst:.1e}"
 
 
 def main():

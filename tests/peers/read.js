@@ -114,5 +114,43 @@ async function laz() {
   rows.push({ points: read.getCount(), took_ms, file: write(Buffer.from(points.buffer)) });
 }
 
-({ '.bag': bag, '.mcap': mcap, '.laz': laz })[path.extname(file)]().then(() =>
+/// All nodes, page by page from the root, in the order in which they lie in the file. Each must lie in its cube, and fields that
+/// runs add must hold visibilities.
+async function copc() {
+  const { Copc } = require('copc');
+  const head = await Copc.create(file);
+  const nodes = {};
+  for (const pages = [head.info.rootHierarchyPage]; pages.length > 0; ) {
+    const part = await Copc.loadHierarchyPage(file, pages.pop());
+    Object.assign(nodes, part.nodes);
+    pages.push(...Object.values(part.pages));
+  }
+  const full = Object.entries(nodes).filter(([, node]) => node.pointCount > 0);
+  full.sort(([, a], [, b]) => a.pointDataOffset - b.pointDataOffset);
+  const added = head.eb.map((field) => field.name).filter((name) => /^(ambient_occlusion|ao_)/.test(name));
+  const points = [];
+  let outside = 0;
+  let odd = 0;
+  for (const [key, node] of full) {
+    const view = await Copc.loadPointDataView(file, head, node);
+    const [level, ...place] = key.split('-').map(Number);
+    const side = (head.info.cube[3] - head.info.cube[0]) / 2 ** level;
+    const axes = ['X', 'Y', 'Z'].map((axis) => view.getter(axis));
+    const values = added.map((name) => view.getter(name));
+    for (let i = 0; i < node.pointCount; ++i) {
+      axes.forEach((at, axis) => {
+        const low = head.info.cube[axis] + side * place[axis], step = head.header.scale[axis];
+        points.push(at(i));
+        outside += at(i) < low - step || at(i) > low + side + step;
+      });
+      odd += values.some((at) => at(i) < 0 || at(i) > 1);
+    }
+  }
+  if (points.length !== 3 * head.header.pointCount || outside + odd > 0)
+    throw new Error(`${points.length / 3} of ${head.header.pointCount} points; ${outside} coordinates outside of nodes, ${odd} odd values`);
+  rows.push({ points: points.length / 3, nodes: full.length, added, file: write(Buffer.from(Float64Array.from(points).buffer)) });
+}
+
+const reader = /\.copc\.laz$/i.test(file) ? copc : { '.bag': bag, '.mcap': mcap, '.laz': laz }[path.extname(file)];
+reader().then(() =>
   fs.writeFileSync(path.join(out, 'index.json'), JSON.stringify(rows)));

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <string>
+#include <vector>
 
 namespace scanshade::tests {
 
@@ -84,39 +85,67 @@ inline std::string laz_file(int format, const laz::Packing& packing, const std::
     return header + laz::packed(records, header.size(), packing) + after;
 }
 
-/// Three nodes of an octree as chunks of 1, 5 and 6 points.
-inline std::string copc_file() {
-    laz::Packing packing = laz::usual_packing(7, 40);
-    packing.chunk_points = laz::varying_chunks;
-    const std::string records = twelve_records(7), copc = vlr("copc", 1, std::string(160, '\0'));
-    std::string header = las_header(7, 40, 12, &packing);
-    header.insert(375, copc);
-    store(header.data() + 96, static_cast<std::uint32_t>(header.size()));
-    store(header.data() + 100, 2U);
-    std::string block(8, '\0'), table(8, '\0');
-    laz::Encoder encoder;
-    laz::IntegerCoder numbers(32, 2);
-    std::uint32_t points_before = 0, bytes_before = 0;
-    for (const auto& [first, count] : {std::pair(0U, 1U), {1U, 5U}, {6U, 6U}}) {
-        const laz::Packing usual = laz::usual_packing(7, 40);
-        const std::string whole = laz::packed(records.substr(40 * first, 40 * count), 0, usual);
-        const std::string chunk = whole.substr(8, load<std::uint64_t>(whole.data()) - 8);
-        numbers.code(encoder, points_before, count, 0);
-        numbers.code(encoder, bytes_before, static_cast<std::uint32_t>(chunk.size()), 1);
-        points_before = count, bytes_before = static_cast<std::uint32_t>(chunk.size());
-        block += chunk;
+inline std::string extended_vlr(const std::string& user, std::uint16_t id, const std::string& data) {
+    std::string bytes(60, '\0');
+    user.copy(bytes.data() + 2, 16);
+    store(bytes.data() + 18, id);
+    store(bytes.data() + 20, static_cast<std::uint64_t>(data.size()));
+    return bytes + data;
+}
+
+struct CopcNode {
+    std::array<std::int32_t, 4> key{}; ///< level, x, y, z
+    std::uint32_t points = 0;          ///< that follow those of the node before in the file
+};
+/// Four levels and an empty node; neither in the order of the tree nor of their keys.
+inline const std::vector<CopcNode> twelve_points_in_nodes{
+    {{2, 2, 0, 0}, 2}, {{0, 0, 0, 0}, 3}, {{1, 0, 0, 0}, 0}, {{3, 5, 1, 0}, 3}, {{1, 1, 0, 0}, 4}};
+
+/// COPC of records of format 7. Levels 2 and more, below the first such node, have a page of their own behind the
+/// root's. Records of nobody's stand before and behind the points, the latter around the hierarchy.
+inline std::string copc_file(const std::string& records = twelve_records(7),
+                             const std::vector<CopcNode>& nodes = twelve_points_in_nodes) {
+    std::vector<std::uint32_t> counts;
+    std::size_t all = 0;
+    for (const CopcNode& node : nodes) {
+        all += node.points;
+        if (node.points > 0)
+            counts.push_back(node.points);
     }
-    store(block.data(), static_cast<std::uint64_t>(header.size() + block.size()));
-    table[4] = 3;
-    const std::string behind = table + encoder.finish();
-    std::string hierarchy(60, '\0'), kept(60, '\0');
-    std::string_view("copc").copy(hierarchy.data() + 2, 4);
-    store(hierarchy.data() + 20, std::uint64_t(96));
-    std::string_view("ours").copy(kept.data() + 2, 4);
-    store(kept.data() + 20, std::uint64_t(4));
-    store(header.data() + 235, static_cast<std::uint64_t>(header.size() + block.size() + behind.size()));
-    store(header.data() + 243, 2U);
-    return header + block + behind + hierarchy + std::string(96, '\0') + kept + "kept";
+    laz::Packing packing = laz::usual_packing(7, records.size() / all);
+    packing.chunk_points = laz::varying_chunks;
+    std::string header = las_header(7, packing.length, all, &packing), info(160, '\0');
+    header.insert(375, vlr("copc", 1, info));
+    header += vlr("ours", 7, "before");
+    store(header.data() + 96, static_cast<std::uint32_t>(header.size()));
+    store(header.data() + 100, 3U);
+    laz::Packer packer(packing, counts);
+    const std::string block = laz::packed(records, header.size(), packer), first = extended_vlr("ours", 8, "kept");
+    const std::vector<laz::Chunk> chunks = packer.chunks(header.size());
+    const std::uint64_t evlrs = header.size() + block.size(), root = evlrs + first.size() + 60;
+    std::array<std::string, 2> pages;
+    const auto add = [](std::string& page, const auto& key, std::uint64_t offset, std::size_t bytes, int count) {
+        std::string entry(32, '\0');
+        store(entry.data(), key), store(entry.data() + 16, offset);
+        store(entry.data() + 24, static_cast<std::int32_t>(bytes)), store(entry.data() + 28, count);
+        page += entry;
+    };
+    std::size_t next = 0;
+    const CopcNode* subtree = nullptr;
+    for (const CopcNode& node : nodes) {
+        const laz::Chunk chunk = node.points > 0 ? chunks.at(next++) : laz::Chunk();
+        if (node.key[0] >= 2 && !subtree)
+            subtree = &node;
+        add(pages[node.key[0] >= 2], node.key, chunk.begin, chunk.bytes, static_cast<int>(node.points));
+    }
+    if (subtree)
+        add(pages[0], subtree->key, root + pages[0].size() + 32, pages[1].size(), -1);
+    store(header.data() + 429, std::array{12.0, 12.0, 12.0, 12.0, 0.2});
+    store(header.data() + 429 + 40, root);
+    store(header.data() + 429 + 48, static_cast<std::uint64_t>(pages[0].size()));
+    store(header.data() + 235, evlrs);
+    store(header.data() + 243, 3U);
+    return header + block + first + extended_vlr("copc", 1000, pages[0] + pages[1]) + extended_vlr("ours", 9, "last");
 }
 
 } // namespace scanshade::tests

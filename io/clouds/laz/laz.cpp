@@ -340,7 +340,7 @@ std::string described(const Packing& packing) {
 Unpacked unpacked(std::string_view file, std::size_t begin, std::size_t end, std::size_t count,
                   const Packing& packing) {
     Unpacked result;
-    std::vector<Chunk> chunks;
+    std::vector<Chunk>& chunks = result.chunks;
     if (packing.compressor == 1) {
         if (count > 0 && (end - begin < packing.length || count > 4096 * (end - begin)))
             throw Error(fmt::format("{} points in {} bytes cannot be", count, end - begin));
@@ -383,39 +383,61 @@ std::string unpacked_chunk(std::string_view bytes, const Chunk& chunk, std::size
 
 std::string Packer::add(std::string_view points) {
     waiting_ += points;
-    const std::size_t step = std::size_t(packing_.chunk_points) * packing_.length;
-    return pack(waiting_.size() / step * step);
+    return pack(false);
 }
 
-/// So many of the waiting bytes.
-std::string Packer::pack(std::size_t bytes) {
-    const std::size_t step = std::size_t(packing_.chunk_points) * packing_.length;
-    const std::string_view points = std::string_view(waiting_).substr(0, bytes);
-    std::vector<std::string> chunks((bytes + step - 1) / step);
-    tbb::parallel_for(std::size_t(0), chunks.size(),
-                      [&](std::size_t i) { chunks[i] = packed_chunk(points.substr(i * step, step), packing_); });
-    std::string result;
-    for (const std::string& chunk : chunks) {
-        sizes_.push_back(static_cast<std::uint32_t>(chunk.size()));
-        result += chunk;
+std::size_t Packer::bytes_of(std::size_t chunk) const {
+    const bool varying = packing_.chunk_points == varying_chunks;
+    return packing_.length * std::size_t(varying ? counts_.at(chunk) : packing_.chunk_points);
+}
+
+/// The chunks that are whole among what waits; with `all`, the last one, too.
+std::string Packer::pack(bool all) {
+    std::vector<std::size_t> ends{0};
+    while (ends.back() < waiting_.size()) {
+        const std::size_t bytes = bytes_of(chunks_.size() + ends.size() - 1), left = waiting_.size() - ends.back();
+        if (bytes > left && !all)
+            break;
+        ends.push_back(ends.back() + std::min(bytes, left));
     }
-    packed_ += result.size();
-    waiting_.erase(0, bytes);
+    std::vector<std::string> packed(ends.size() - 1);
+    tbb::parallel_for(std::size_t(0), packed.size(), [&](std::size_t i) {
+        packed[i] = packed_chunk(std::string_view(waiting_).substr(ends[i], ends[i + 1] - ends[i]), packing_);
+    });
+    std::string result;
+    for (std::size_t i = 0; i < packed.size(); ++i) {
+        const std::uint64_t first = chunks_.empty() ? 0 : chunks_.back().first + chunks_.back().count;
+        chunks_.push_back({8 + packed_, packed[i].size(), first, (ends[i + 1] - ends[i]) / packing_.length});
+        packed_ += packed[i].size();
+        result += packed[i];
+    }
+    waiting_.erase(0, ends.back());
     return result;
 }
 
 std::string Packer::finish() {
-    std::string result = pack(waiting_.size());
+    std::string result = pack(true);
     std::string table(8, '\0');
-    store(table.data() + 4, static_cast<std::uint32_t>(sizes_.size()));
+    store(table.data() + 4, static_cast<std::uint32_t>(chunks_.size()));
     Encoder encoder;
     IntegerCoder numbers(32, 2);
-    std::uint32_t before = 0;
-    for (const std::uint32_t size : sizes_) {
-        numbers.code(encoder, before, size, 1);
-        before = size;
+    Chunk before;
+    for (const Chunk& chunk : chunks_) {
+        if (packing_.chunk_points == varying_chunks)
+            numbers.code(encoder, static_cast<std::uint32_t>(before.count), static_cast<std::uint32_t>(chunk.count), 0);
+        numbers.code(encoder, static_cast<std::uint32_t>(before.bytes), static_cast<std::uint32_t>(chunk.bytes), 1);
+        before = chunk;
     }
-    return result + table + (sizes_.empty() ? "" : encoder.finish());
+    table += chunks_.empty() ? "" : encoder.finish();
+    size_ = 8 + packed_ + table.size();
+    return result + table;
+}
+
+std::vector<Chunk> Packer::chunks(std::uint64_t begin) const {
+    std::vector<Chunk> there = chunks_;
+    for (Chunk& chunk : there)
+        chunk.begin += begin;
+    return there;
 }
 
 std::string Packer::table(std::uint64_t begin) const {
@@ -424,10 +446,14 @@ std::string Packer::table(std::uint64_t begin) const {
     return bytes;
 }
 
-std::string packed(std::string_view points, std::size_t begin, const Packing& packing) {
-    Packer packer(packing);
+std::string packed(std::string_view points, std::size_t begin, Packer& packer) {
     const std::string chunks = packer.add(points), rest = packer.finish();
     return packer.table(begin) + chunks + rest;
+}
+
+std::string packed(std::string_view points, std::size_t begin, const Packing& packing) {
+    Packer packer(packing);
+    return packed(points, begin, packer);
 }
 
 } // namespace scanshade::laz

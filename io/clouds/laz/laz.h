@@ -7,6 +7,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace scanshade::laz {
@@ -51,7 +52,9 @@ using ReadBytes = std::function<std::string(std::uint64_t at, std::uint64_t coun
 /// Packs points that come in any portions; the bytes are those of packed().
 class Packer {
   public:
-    explicit Packer(const Packing& packing) : packing_(packing) {}
+    /// `counts`: the points of each chunk, where chunks vary; other chunks have those that `packing` says.
+    explicit Packer(const Packing& packing, std::vector<std::uint32_t> counts = {})
+        : packing_(packing), counts_(std::move(counts)) {}
     /// What can be written of the block's chunks so far.
     [[nodiscard]] std::string add(std::string_view points);
     /// The rest: the last chunk and the table. The block's first eight bytes, which come before all chunks, are
@@ -60,19 +63,26 @@ class Packer {
     /// Where the table begins in a file whose block begins at `begin`, as the block's first eight bytes. After
     /// finish().
     [[nodiscard]] std::string table(std::uint64_t begin) const;
+    /// Where the chunks lie in that file. After finish().
+    [[nodiscard]] std::vector<Chunk> chunks(std::uint64_t begin) const;
+    /// Bytes of the block. After finish().
+    [[nodiscard]] std::uint64_t size() const { return size_; }
 
   private:
-    [[nodiscard]] std::string pack(std::size_t bytes);
+    [[nodiscard]] std::string pack(bool all);
+    [[nodiscard]] std::size_t bytes_of(std::size_t chunk) const;
 
     Packing packing_;
+    std::vector<std::uint32_t> counts_;
     std::string waiting_;
-    std::vector<std::uint32_t> sizes_; ///< of chunks
-    std::uint64_t packed_ = 0;
+    std::vector<Chunk> chunks_; ///< of a block that begins at 0
+    std::uint64_t packed_ = 0, size_ = 0;
 };
 
 struct Unpacked {
-    std::string points;  ///< record after record, as an uncompressed file has them
-    std::size_t end = 0; ///< of the block, as an offset in the file
+    std::string points;        ///< record after record, as an uncompressed file has them
+    std::size_t end = 0;       ///< of the block, as an offset in the file
+    std::vector<Chunk> chunks; ///< as they lie in the file
 };
 /// `file` is the whole file, whose block of points begins at `begin` and ends at `end` at the latest. Chunks are
 /// decoded on all cores. Memory is taken for what chunks can hold, in steps where the number of points is beyond common
@@ -81,6 +91,7 @@ struct Unpacked {
                                 const Packing& packing);
 
 /// The block of points for a file in which it begins at `begin`. The bytes do not depend on the number of cores.
+[[nodiscard]] std::string packed(std::string_view points, std::size_t begin, Packer& packer);
 [[nodiscard]] std::string packed(std::string_view points, std::size_t begin, const Packing& packing);
 
 } // namespace scanshade::laz
