@@ -379,7 +379,11 @@ struct Seams {
     /// Three standard errors, and half a step of 8 bits, which nobody sees. Standard errors are of blocks, so they do
     /// not cover what all blocks share, the directions of a seed: with five seeds the noisy corner's squares were
     /// -1.9e-6 .. 4.2e-6 more beside borders than elsewhere, where one standard error is 0.7e-6 .. 3e-6.
-    void check(const char* what) const {
+    ///
+    /// A cloud that is cleaned differs by more everywhere, since its discs depend on points farther away than a rim is
+    /// wide (0.0105 RMS where other rays differ by 0.0079; 0.0089 with rims of twice the radius): `cleaned` allows
+    /// that.
+    void check(const char* what, bool cleaned = false) const {
         fmt::print(
             "seams, {}: {} points beside borders; RMS of rays {:.4f} there, {:.4f} elsewhere; excess of squares "
             "{:.2e} +- {:.1e} there, {:.2e} +- {:.1e} elsewhere; shift {:.5f} +- {:.5f} there; told error {:.3f}\n",
@@ -389,7 +393,8 @@ struct Seams {
         const double uncertain = std::hypot(excess[1].error(), excess[0].error());
         constexpr double unseen = 0.5 / 255;
         EXPECT_LT(excess[1].mean() - excess[0].mean(), 3 * uncertain + unseen * unseen) << what;
-        EXPECT_LT(excess[0].mean(), 0.2 * seeds[0].mean() + 3 * excess[0].error())
+        constexpr double of_cleaning = 1.5e-4;
+        EXPECT_LT(excess[0].mean(), cleaned ? of_cleaning : 0.2 * seeds[0].mean() + 3 * excess[0].error())
             << what << ": tiles change values everywhere by more than other rays do";
         EXPECT_LT(std::abs(shift[1].mean()), 3 * shift[1].error()) << what;
         EXPECT_LT(std::sqrt(3 * uncertain + unseen * unseen), 0.02) << what << ": a step of that height would be seen";
@@ -443,9 +448,10 @@ Points terrain(std::size_t count, double sigma = 0.0005) {
 }
 
 TEST(LargeCloud, indoors_values_differ_no_more_beside_borders_of_tiles_than_rays_do) {
-    for (const double sigma : {0.0, 0.002})
-        seams_of(tests::corner(400000, sigma), {.radius = 0.2, .outside = "1,1,1", .memory_mib = 64})
-            .check(sigma > 0 ? "noisy corner" : "corner");
+    const std::array names{"corner", "noisy corner", "cleaned corner"};
+    for (const int sigma_mm : {0, 1, 2})
+        seams_of(tests::corner(400000, 0.001 * sigma_mm), {.radius = 0.2, .outside = "1,1,1", .memory_mib = 64})
+            .check(names[static_cast<std::size_t>(sigma_mm)], sigma_mm == 2);
 }
 
 TEST(LargeCloud, on_terrain_values_differ_no_more_beside_borders_of_tiles_than_rays_do) {
