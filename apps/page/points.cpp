@@ -87,7 +87,7 @@ std::uint32_t spread(std::uint32_t bits) {
 struct Place {
     std::uint32_t curve, index;
 
-    auto operator<=>(const Place&) const = default;
+    auto operator<=>(const Place&) const = default; // NOLINT(modernize-use-nullptr)
 };
 
 /// The points in the box along the curve, at most about 2 `most` of them.

@@ -347,7 +347,7 @@ Pinhole camera_of_size(cv::Size size) {
     return {f, f, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size};
 }
 
-std::vector<Parameter> GenerateOptions::parameters() {
+std::vector<Parameter> GenerateOptions::parameters() { // NOLINT(readability-function-size): a table
     std::vector<Parameter> rows{
         {.name = "sensor", .help = "the depth sensor simulated", .value = &sensor, .choices = names_of(sensors())},
         {.name = "frames", .help = "frames to record", .value = &frames, .low = 1, .high = 100000},

@@ -455,7 +455,7 @@ TEST_F(HookedJobTest, a_kill_between_delivery_and_journal_delivers_the_same_agai
 
 TEST_F(HookedJobTest, scratch_of_a_killed_run_makes_room_for_others) {
     ASSERT_EQ(plan(std::string(copy_in) + " && head -c 1000000 /dev/zero >{dir}/pad.bin",
-                   fmt::format("[ -e {} ] && ", path("open")) + deliver(), "--hook-tries 1 --scratch-limit 0.0025")
+                   fmt::format("[ -e {} ] && ", path("open")) + deliver(), "--hook-tries 1 --scratch-limit 0.003")
                   .exit_code,
               0);
     EXPECT_EQ(run().exit_code, unfinished) << "nothing can be delivered, so that remains fill the space";
