@@ -2,6 +2,7 @@
 #pragma once
 
 #include "apps/frame/frame_images.h"
+#include "apps/results/recording_cloud.h"
 
 namespace scanshade {
 

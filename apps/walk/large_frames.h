@@ -3,6 +3,7 @@
 
 #include "apps/frame/work.h"
 #include "apps/large/large_cloud_run.h"
+#include "apps/walk/batch_options.h"
 
 #include <functional>
 #include <map>

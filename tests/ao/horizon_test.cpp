@@ -22,8 +22,10 @@ constexpr Wanted all_layers{true, true, true, true, true, true};
 HeightField made(int size, const std::function<double(double east, double north)>& shape, int columns = 0) {
     HeightField field{cv::Mat1f(size, columns > 0 ? columns : size), 1};
     for (int r = 0; r < field.z.rows; ++r)
-        for (int c = 0; c < field.z.cols; ++c)
-            field.z(r, c) = static_cast<float>(shape(c - field.z.cols / 2, field.z.rows / 2 - r));
+        for (int c = 0; c < field.z.cols; ++c) {
+            const int east = c - field.z.cols / 2, north = field.z.rows / 2 - r;
+            field.z(r, c) = static_cast<float>(shape(east, north));
+        }
     return field;
 }
 
