@@ -34,9 +34,9 @@ inline constexpr std::size_t points_in_a_chunk = 100000;
 inline constexpr std::size_t most_fields = 24; ///< those behind are counted, not written
 
 /// Writes FOLDER/STEM.000.js, FOLDER/STEM.001.js ... of at most `most` points; returns these names without the folder.
-/// Positions get 16 bits in a box round all but stray points, which are left out. Fields get 16 bits,
-/// exact for integers that differ by less than 65535. Each file is atomic; equal inputs
-/// give equal bytes. Memory: 16 bytes for each of at most 2 `most` points, and a few megabytes for each core.
+/// Positions get 16 bits in a box round all but stray points, which are left out. Fields get 16 bits, exact for
+/// integers that differ by less than 65535. Each file is atomic; equal inputs give equal bytes. Memory: 16 bytes for
+/// each of at most 2 `most` points, and a few megabytes for each core.
 std::vector<std::filesystem::path> write_points(const std::filesystem::path& folder, const std::filesystem::path& stem,
                                                 const Points& cloud, std::size_t most);
 

@@ -1,6 +1,7 @@
 // Depth frames of a simulated sensor as one cloud.
 #include "apps/scenes/merged_frames.h"
 
+#include "apps/scenes/generate.h"
 #include "apps/scenes/sensor.h"
 #include "apps/scenes/world/random_noise.h"
 #include "projection/base/hash.h"
@@ -14,7 +15,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-const Pinhole camera{525, 525, 319.5, 239.5, {640, 480}};
 constexpr double frames_per_s = 10;
 
 template <class Value>
@@ -44,6 +44,7 @@ Vector3d shift_of(int frame, double sigma, int seed) {
 } // namespace
 
 SceneCloud merged_frames(const World& world, std::size_t count, const MergedFrames& options, int seed) {
+    const Pinhole camera = camera_of_size({640, 480});
     const double pixels = static_cast<double>(options.frames) * camera.size.area();
     const int stride = std::max(1, static_cast<int>(std::sqrt(pixels / static_cast<double>(count)) + 0.5));
     SceneCloud cloud;

@@ -181,6 +181,27 @@ TEST(CleanedCloud, makes_no_discs_of_points_that_no_plane_explains) {
         ASSERT_LT(cloud.fitted_of[i], cloud.points.size());
 }
 
+/// Wrong signs would make a second layer of the slab. Most of a disc's eight points are right: 0.81 of the discs where
+/// three of ten points are wrong (binomial), nearly all where one in twenty is.
+TEST(CleanedCloud, takes_the_side_that_most_points_recorded) {
+    const Points points = square(60000, 0.02);
+    const auto cleaned = [&](const Points& normals) {
+        return fitted_cloud(LocalCloud(points), points, normals, 0.5, thinning_grid(Vector3d::Zero(), 0.008), true);
+    };
+    const FittedCloud unsigned_discs = cleaned({});
+    for (const auto& [wrong, right] : {std::pair(0.05, 0.99), std::pair(0.3, 0.81)}) {
+        Points normals;
+        Dice dice(3);
+        for (std::size_t i = 0; i < points.size(); ++i)
+            normals.emplace_back(0, 0, dice.roll() < wrong ? -1 : 1);
+        const FittedCloud cloud = cleaned(normals);
+        EXPECT_EQ(cloud.points, unsigned_discs.points) << wrong;
+        ASSERT_EQ(cloud.normals.size(), cloud.points.size());
+        const auto up = std::ranges::count_if(cloud.normals, [](const Vector3d& normal) { return normal.z() > 0.5; });
+        EXPECT_GT(static_cast<double>(up), right * static_cast<double>(cloud.normals.size())) << wrong;
+    }
+}
+
 TEST(CleanedCloud, is_asked_for_where_noise_exceeds_the_spacing) {
     for (const auto& [sigma, exceeds] : {std::pair{0.0, false}, {0.0015, false}, {0.012, true}}) {
         const Points points = square(60000, sigma); // 8 mm apart

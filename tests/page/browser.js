@@ -48,8 +48,13 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     if (wait) await page.waitForSelector("html[data-ready]", { timeout: 20000 });
     return page;
   };
+  /** Time passes, and pictures: what an action asks for is drawn by the second one after it, however slow they are. */
+  const pause = async (page, ms) => {
+    await page.waitForTimeout(ms);
+    await page.evaluate(async () => { for (let i = 0; i < 4; ++i) await new Promise(requestAnimationFrame); });
+  };
   const loaded = (page) => page.waitForFunction(() => [...document.querySelectorAll(".layer img")].every((image) => image.complete) && document.querySelector("#layer-right .inside"), null, { timeout: 10000 });
-  const settle = async (page) => { await loaded(page); await page.waitForTimeout(120); };
+  const settle = async (page) => { await loaded(page); await pause(page, 120); };
 
   const decoder = await (await browser.newContext()).newPage();
   /** Red, green, blue of the element's picture at shares of its width and height. */
@@ -119,7 +124,7 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     await check(`quiet over ${scheme}`, async (open_page) => {
       for (const file of every) {
         const page = await open_page(file, { scheme, wait: !is_document(file) });
-        await page.waitForTimeout(300);
+        await pause(page, 300);
         if (file === run || file === cloud) {
           await page.click("#show-points");
           await page.waitForFunction(() => document.querySelector("#point-canvas").dataset.loaded, null, { timeout: 20000 });
@@ -263,7 +268,7 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
   const points_of = async (page) => {
     await page.click("#show-points");
     await page.waitForFunction(() => document.querySelector("#point-canvas").dataset.loaded, null, { timeout: 20000 });
-    await page.waitForTimeout(300);
+    await pause(page, 300);
   };
   const background = [20, 23, 27];
 
@@ -271,18 +276,18 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     const page = await open_page(run, { hash: "#0" });
     await points_of(page);
     await page.selectOption("#point-source", "frame 0");
-    await page.waitForTimeout(500);
+    await pause(page, 500);
     expect(apart(await pixel(page, "#point-stage", 0.5, 0.5), background) > 20, "the centre is background");
     const [x, y] = await on_stage(page, "#point-stage", spec.dark);
     const strong = await pixel(page, "#point-stage", x, y);
     await slide(page, "#point-strength", 0);
-    await page.waitForTimeout(300);
+    await pause(page, 300);
     const none = await pixel(page, "#point-stage", x, y);
     expect(none[0] + none[1] + none[2] > strong[0] + strong[1] + strong[2] + 12, `AO strength 0: ${none}, 1: ${strong}`);
     const seen = [];
     for (const mode of ["colour", "ao", "confidence", "normal"]) {
       await page.selectOption("#point-colour", mode);
-      await page.waitForTimeout(200);
+      await pause(page, 200);
       const centre = await pixel(page, "#point-stage", 0.5, 0.5); // two values may be alike at one of the points
       seen.push([...(await pixel(page, "#point-stage", x, y)), ...centre].join());
     }
@@ -296,7 +301,7 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     await page.selectOption("#point-source", "frame 0");
     await slide(page, "#point-strength", 0);
     await page.locator("#point-edl").uncheck();
-    await page.waitForTimeout(500);
+    await pause(page, 500);
     const drawn = await pixel(page, "#point-stage", 0.5, 0.5);
     await page.click("#show-frame");
     await page.selectOption("#left", "colour");
@@ -311,10 +316,10 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     const page = await open_page(run, { hash: "#0" });
     await points_of(page);
     await page.selectOption("#point-source", "recording");
-    await page.waitForTimeout(1200);
+    await pause(page, 1200);
     expect((await page.textContent("#point-readout")).includes("points"), "nothing said of the points");
     for (let i = 0; i < spec.frames - 1; ++i) await page.keyboard.press("ArrowRight");
-    await page.waitForTimeout(900);
+    await pause(page, 900);
     const eye = await page.evaluate(() => scanshade.shown_camera().eye);
     const pose = spec.last_position;
     expect(Math.hypot(...eye.map((value, i) => value - pose[i])) < 1e-3, `the eye is at ${eye}, the camera at ${pose}`);
@@ -327,7 +332,7 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     const turned = await page.evaluate(() => scanshade.shown_camera().eye);
     expect(Math.hypot(...eye.map((value, i) => value - turned[i])) > 0.05, "dragging does not turn");
     await page.click("#point-home");
-    await page.waitForTimeout(300);
+    await pause(page, 300);
     const back = await page.evaluate(() => scanshade.shown_camera().eye);
     expect(Math.hypot(...back.map((value, i) => value - pose[i])) < 1e-3, "the button does not lead back");
   });
@@ -366,7 +371,7 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     for (const name of ["origin", "utm", "geocentric"]) {
       const page = await open_page(spec.tiles[name]);
       await points_of(page);
-      await page.waitForTimeout(400);
+      await pause(page, 400);
       pictures[name] = await page.locator("#point-canvas").screenshot();
     }
     for (const name of ["utm", "geocentric"]) {
@@ -395,11 +400,11 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     const along = (axis) => axis.reduce((sum, value, i) => sum + value * (p[i] - camera.eye[i]), 0), z = along(camera.forward);
     return [0.5 + along(camera.right) / z / (2 * camera.half_height) * canvas.clientHeight / canvas.clientWidth, 0.5 + along(camera.down) / z / (2 * camera.half_height)];
   }, place);
-  const drawn = async (page) => { await page.waitForTimeout(400); return page.locator("#point-canvas").screenshot(); };
+  const drawn = async (page) => { await pause(page, 400); return page.locator("#point-canvas").screenshot(); };
   const click_at = async (page, place) => {
     const [x, y] = await in_view(page, place), box = await page.locator("#point-canvas").boundingBox();
     await page.mouse.click(box.x + x * box.width, box.y + y * box.height);
-    await page.waitForTimeout(300);
+    await pause(page, 300);
     return Object.fromEntries(await page.$$eval("#picked-values tr", (lines) => lines.map((line) => [...line.children].map((cell) => cell.textContent))));
   };
   const roof = [10, 10, 4], ground = [3, 4, 0];
@@ -445,7 +450,7 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     await slide(page, "#point-strength", 0);
     const legend = await page.$$eval("#class-legend li", (lines) => lines.map((line) => line.textContent));
     for (const [i, words] of ["2 ground", "5 high vegetation 25.0 %", "6 building"].entries()) expect(legend[i]?.startsWith(words), `${words} for ${legend}`);
-    await page.waitForTimeout(400);
+    await pause(page, 400);
     const shown = await pixel(page, "#point-canvas", ...(await in_view(page, roof.map((value, axis) => value + spec.utm[axis]))));
     expect(apart(shown, [222, 82, 60]) < 4, `a roof in ${shown}`);
     await slide(page, "#point-strength", 1);
@@ -505,7 +510,7 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     await page.focus("#point-canvas");
     for (const key of ["ArrowLeft", "ArrowUp", "+"]) await page.keyboard.press(key);
     const shot = await drawn(page);
-    await page.waitForTimeout(500);
+    await pause(page, 500);
     const again = await open_page(spec.tiles.utm, { hash: new URL(page.url()).hash });
     await points_of(again);
     expect((await again.inputValue("#point-colour")) === "height", await again.inputValue("#point-colour"));
@@ -578,7 +583,7 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     const in_page = () => page.$$eval("#rows tbody tr[data-row]", (lines) => lines.length);
     expect((await in_page()) < 100, `${await in_page()} rows in the document`);
     await page.locator("#rows").evaluate((place) => { place.scrollTop = place.scrollHeight; });
-    await page.waitForTimeout(150);
+    await pause(page, 150);
     const order = await page.$$eval("#rows tbody tr[data-row]", (lines) => lines.map((line) => Number(line.getAttribute("aria-rowindex"))));
     expect(Math.max(...order) === 10001, `the last row is ${Math.max(...order)}`);
     const visible = await page.locator("#rows").evaluate((place) => {
@@ -657,20 +662,20 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     const bare = path.join(path.dirname(spec.scratch), "alone.html");
     fs.copyFileSync(run, bare);
     const page = await open_page(bare, { wait: false });
-    await page.waitForTimeout(300);
+    await pause(page, 300);
     expect((await page.textContent("#trouble")).includes("index.js is not beside this page"), await page.textContent("#trouble"));
     const folder = path.join(path.dirname(spec.scratch), "partly");
     fs.mkdirSync(folder, { recursive: true });
     for (const file of ["index.html", "index.js"]) fs.copyFileSync(path.join(path.dirname(run), file), path.join(folder, file));
     const partly = await open_page(path.join(folder, "index.html"));
-    await partly.waitForTimeout(500);
+    await pause(partly, 500);
     expect((await partly.textContent("#readout")).includes("is missing"), await partly.textContent("#readout"));
   });
 
   await check("narrow screens", async (open_page) => {
     for (const file of [run, cloud, comparison, list, bench, camera]) {
       const page = await open_page(file, { width: 360, height: 740, wait: !is_document(file) });
-      await page.waitForTimeout(200);
+      await pause(page, 200);
       const wide = await page.evaluate(() => document.scrollingElement.scrollWidth - innerWidth);
       expect(wide <= 0, `${file} is ${wide} px too wide`);
     }
@@ -693,7 +698,7 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
     for (const file of [run, cloud, hostile, comparison, list, bench, camera])
       for (const dark of [false, true]) {
         const page = await open_page(file, { dark, wait: !is_document(file) });
-        await page.waitForTimeout(300);
+        await pause(page, 300);
         for (const view of file === run ? ["frame", "points"] : [""]) {
           if (view === "points") await page.click("#show-points");
           await page.evaluate(axe);

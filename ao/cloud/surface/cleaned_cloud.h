@@ -20,7 +20,7 @@ struct Slab {
 [[nodiscard]] std::vector<std::optional<Slab>> slabs_around(const NeighbourTree& tree,
                                                             std::span<const Eigen::Vector3d> normals,
                                                             std::span<const std::size_t> indices, float widest);
-/// Whether noise is larger than the spacing at enough of the places.
+/// Whether windows of a few spacings see slabs, no surfaces: sigma is above 0.36 of the spacing at 40 % of the places.
 [[nodiscard]] bool noise_exceeds_spacing(std::span<const std::optional<Slab>> slabs);
 
 /// Discs on the surface that the points scatter about; each stands for the points that were moved to it.

@@ -482,14 +482,32 @@ std::optional<bool> opposed_beside(const NeighbourTree& tree, std::span<const Ve
            -0.7F;
 }
 
-bool sides_agree(std::span<const std::optional<bool>> opposed) {
-    constexpr double random_from = 0.05; // boxes of 0.3 m turned over: 0.08; thin boards, right: 0.04 and less
+bool sides_agree(std::span<const std::optional<bool>> opposed, bool exceeds_spacing) {
+    // Right normals of merged frames: 0.004 at most. Boxes of 0.3 m turned over: 0.03 and more, by their number.
+    constexpr double layers_from = 0.015, random_from = 0.1;
+    const double most = exceeds_spacing ? layers_from : random_from;
     const auto pairs = std::ranges::count_if(opposed, [](const auto& each) { return each.has_value(); });
     const auto against = std::ranges::count_if(opposed, [](const auto& each) { return each.value_or(false); });
-    return static_cast<double>(against) < random_from * static_cast<double>(pairs);
+    return static_cast<double>(against) < most * static_cast<double>(pairs);
 }
 
 namespace {
+
+/// Signs that do not agree would split a slab into layers. Then discs are made without them, and each takes the side
+/// that most of its points recorded.
+FittedCloud cleaned(const LocalCloud& local, std::span<const Vector3d> points, std::span<const Vector3d> normals,
+                    bool sides, double radius, const ThinningGrid& grid) {
+    if (sides || normals.empty())
+        return cleaned_cloud(local, points, normals, radius, grid);
+    FittedCloud cloud = cleaned_cloud(local, points, {}, radius, grid);
+    std::vector<int> votes(cloud.points.size());
+    for (std::size_t i = 0; i < cloud.fitted_of.size(); ++i)
+        if (is_direction(normals[i]))
+            votes[cloud.fitted_of[i]] += normals[i].dot(cloud.axes[cloud.fitted_of[i]].cast<double>()) < 0 ? -1 : 1;
+    for (std::size_t disc = 0; disc < votes.size(); ++disc)
+        cloud.normals.push_back((votes[disc] < 0 ? -1 : 1) * cloud.axes[disc].cast<double>());
+    return cloud;
+}
 
 /// `fewest`: of the points must move, else none does.
 FittedCloud fitted_by(const CloudNoise& noise, bool sides, const LocalCloud& local, std::span<const Vector3d> points,
@@ -536,9 +554,9 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
     std::vector<std::optional<bool>> opposed(normals.empty() ? 0 : sample);
     for (std::size_t k = 0; k < opposed.size(); ++k)
         opposed[k] = opposed_beside(local.tree, normals, (2 * k + 1) * local.size() / (2 * sample));
-    const bool sides = !normals.empty() && sides_agree(opposed);
+    const bool sides = !normals.empty() && sides_agree(opposed, exceeds_spacing);
     if (exceeds_spacing)
-        return cleaned_cloud(local, points, sides ? normals : std::span<const Vector3d>(), radius, grid);
+        return cleaned(local, points, normals, sides, radius, grid);
     const CloudNoise noise(local.tree, static_cast<float>(radius) / 3, sides ? normals : std::span<const Vector3d>());
     return noise.known() ? fitted_by(noise, sides, local, points, normals, grid, (points.size() + 99) / 100)
                          : FittedCloud();
@@ -549,7 +567,7 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
     if (points.size() < fewest_fitted)
         return {};
     if (noise.exceeds_spacing)
-        return cleaned_cloud(local, points, noise.sides ? normals : std::span<const Vector3d>(), radius, grid);
+        return cleaned(local, points, normals, noise.sides, radius, grid);
     return fitted_by(noise.noise.moved(local.middle - noise.middle), noise.sides && !normals.empty(), local, points,
                      normals, grid, 1);
 }

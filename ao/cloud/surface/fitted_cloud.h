@@ -57,7 +57,7 @@ struct ThinningGrid {
 [[nodiscard]] std::optional<bool> opposed_beside(const NeighbourTree& tree, std::span<const Eigen::Vector3d> normals,
                                                  std::size_t index);
 /// By that of many points, whether the signs of recorded normals are more than chance; else both sides of a plane are
-/// one.
-[[nodiscard]] bool sides_agree(std::span<const std::optional<bool>> opposed);
+/// one. Where noise exceeds the spacing, few wrong signs make layers of a slab, so nearly all must agree.
+[[nodiscard]] bool sides_agree(std::span<const std::optional<bool>> opposed, bool exceeds_spacing);
 
 } // namespace scanshade

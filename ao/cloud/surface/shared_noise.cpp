@@ -27,12 +27,13 @@ std::int64_t number_of(const Vector3d& scaled, const Vector3i& off) {
     return all;
 }
 
-std::optional<SharedNoise> known_noise(const Vector3d& middle, CloudNoise&& noise, bool sides,
+std::optional<SharedNoise> known_noise(const Vector3d& middle, CloudNoise&& noise,
+                                       std::span<const std::optional<bool>> opposed,
                                        std::span<const std::optional<Slab>> slabs) {
     const bool exceeds_spacing = noise_exceeds_spacing(slabs);
     if (!noise.known() && !exceeds_spacing)
         return std::nullopt;
-    return SharedNoise{middle, std::move(noise), sides, exceeds_spacing};
+    return SharedNoise{middle, std::move(noise), sides_agree(opposed, exceeds_spacing), exceeds_spacing};
 }
 
 } // namespace
@@ -55,9 +56,9 @@ std::optional<SharedNoise> noise_at(std::span<const NoisePlace> places, const Lo
     std::vector<std::optional<bool>> opposed;
     for (const std::size_t index : normals.empty() ? std::vector<std::size_t>() : indices)
         opposed.push_back(opposed_beside(cloud.tree, normals, index));
-    const bool sides = !normals.empty() && sides_agree(opposed);
+    const bool sides = sides_agree(opposed, false);
     const std::span<const Vector3d> facing = sides ? normals : std::span<const Vector3d>();
-    return known_noise(cloud.middle, CloudNoise(cloud.tree, look, facing, indices), sides,
+    return known_noise(cloud.middle, CloudNoise(cloud.tree, look, facing, indices), opposed,
                        slabs_around(cloud.tree, facing, indices, look.reach));
 }
 
@@ -149,7 +150,7 @@ std::optional<SharedNoise> NoisePlaces::measured() const {
         each([&](std::size_t k, const NeighbourTree& tree, const std::vector<Vector3d>& normals, std::size_t own) {
             opposed[k] = opposed_beside(tree, normals, own);
         });
-        sides = sides_agree(opposed);
+        sides = sides_agree(opposed, false);
     }
     std::vector<std::optional<Slab>> slabs(rounds.size());
     each([&](std::size_t k, const NeighbourTree& tree, const std::vector<Vector3d>& normals, std::size_t own) {
@@ -158,7 +159,7 @@ std::optional<SharedNoise> NoisePlaces::measured() const {
         slabs[k] = slabs_around(tree, facing, std::array{own}, look_.reach)[0];
         positions[k] = (rounds[k]->place.point - middle).cast<float>();
     });
-    return known_noise(middle, CloudNoise(positions, found), sides, slabs);
+    return known_noise(middle, CloudNoise(positions, found), opposed, slabs);
 }
 
 } // namespace scanshade
