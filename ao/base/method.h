@@ -3,6 +3,7 @@
 
 #include "projection/base/error.h"
 #include "projection/base/parameters.h"
+#include "projection/base/station.h"
 #include "projection/maps.h"
 #include "projection/sensor/noise.h"
 
@@ -134,6 +135,7 @@ struct PointSet {
     bool z_up = false;         ///< whether z is known to point to the sky
     bool from_scanner = false; ///< whether all were surely seen from the scanner's position, as in a lidar's sweep
     std::span<const Eigen::Vector3d> seen_from = {}; ///< the camera of each, where cameras are known; else empty
+    std::span<const Station> stations = {};          ///< as a file of several scans says; empty = it does not
 };
 
 /// Values of points, and what was chosen on the way.

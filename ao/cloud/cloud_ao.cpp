@@ -3,10 +3,12 @@
 
 #include "ao/cloud/cloud_work.h"
 #include "ao/cloud/large_cloud.h"
+#include "ao/cloud/sides/recorded_stations.h"
 #include "ao/gpu/device.h"
 #include "ao/raycast/raycast.h"
 #include "projection/base/error.h"
 #include "projection/base/statistics.h"
+#include "projection/base/stopwatch.h"
 
 #include <algorithm>
 #include <cmath>
@@ -24,6 +26,9 @@ double default_radius(double extent, double spacing) {
 PointVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vector3d>& scanner) {
     if (!cloud.triangles.empty() && !options_.sky)
         return of_mesh(cloud);
+    if (!cloud.stations.empty() && cloud.seen_from.empty() && options_.outside == "auto" &&
+        options_.normals != CloudNormals::recorded)
+        return of_scans(cloud, scanner);
     const CloudSetup setup{options_, device_, up_, viewpoint_};
     if (!options_.sky && cloud.points.size() > points_at_once(setup))
         return in_tiles(setup, cloud, scanner);
@@ -31,6 +36,28 @@ PointVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vect
     PointVisibility found = work.run();
     signs_ = work.take_signs();
     return found;
+}
+
+/// Each side to the station that recorded it, if the stations can be right. Recorded normals that face theirs stay.
+PointVisibility CloudAo::of_scans(PointSet cloud, const std::optional<Vector3d>& scanner) {
+    constexpr double hardly_opposed = 0.05, same_planes = 0.8;
+    const Stopwatch stopwatch;
+    const bool recorded = !cloud.normals.empty() && options_.normals != CloudNormals::estimated;
+    const RecordedStations found =
+        recorded_stations(cloud.stations, cloud.points, recorded ? cloud.normals : std::span<const Vector3d>());
+    const double judged_ms = stopwatch.ms();
+    const bool believed = !found.seen_from.empty(), on_planes = recorded && found.agreement >= same_planes;
+    cloud.stations = {};
+    if (!on_planes || found.opposed > hardly_opposed)
+        cloud.seen_from = found.seen_from;
+    PointVisibility result = compute(cloud, scanner);
+    result.timings.insert(result.timings.begin(), {"stations", judged_ms});
+    result.notes.push_back(found.note);
+    if (on_planes && believed && found.opposed > hardly_opposed)
+        result.doubts.push_back(fmt::format("{:.0f} % of the recorded normals face away from the scanner that recorded "
+                                            "them; they were turned: --cloud.normals recorded keeps them.",
+                                            100 * found.opposed));
+    return result;
 }
 
 /// The sky is seen at any distance, past all tiles.

@@ -56,6 +56,7 @@ class CloudAo final : public PointMethod {
 
   private:
     [[nodiscard]] PointVisibility of_mesh(const PointSet& mesh) const;
+    [[nodiscard]] PointVisibility of_scans(PointSet cloud, const std::optional<Eigen::Vector3d>& scanner);
 
     CloudAoOptions options_;
     gpu::Device* device_;

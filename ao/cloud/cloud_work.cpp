@@ -208,11 +208,16 @@ void CloudWork::copy_to_twins() {
 }
 
 WholeSides CloudWork::settle_sides() {
-    CloudSurface surface = planes_of(valid_, nullptr).surface;
+    Fitted planes = planes_of(valid_, nullptr);
+    CloudSurface& surface = planes.surface;
     fitted_ = {}; // tiles tell of themselves
     drop_strays(surface, decided_.extent.centre, static_cast<double>(surface.spacing));
     std::optional<DiscRays> rays;
-    std::vector<float> known = sides_.settle(surface, rays, recorded());
+    std::vector<float> known;
+    if (cloud_.seen_from.empty())
+        known = sides_.settle(surface, rays, recorded());
+    else
+        turn_to_cameras(surface, planes.points, valid_);
     return {std::move(surface), std::move(known)};
 }
 
@@ -520,21 +525,15 @@ std::vector<float> CloudWork::sides_as_in_whole(CloudSurface& surface) const {
     return known;
 }
 
-/// Each normal to the camera that saw its point, or one of those that the disc stands for. No side is wrong then.
+/// To the camera or station that saw each point, or one of those that the disc stands for.
 void CloudWork::turn_to_cameras(CloudSurface& surface, const FittedCloud& fitted, const Indices& round) {
     std::vector<std::uint32_t> point_of(fitted.points.size());
     for (std::size_t k = 0; k < round.size() && !fitted.empty(); ++k)
         point_of[fitted.fitted_of[k]] = round[k];
-    tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
-        const std::size_t given = surface.tree.original(i);
-        const Vector3d& camera = cloud_.seen_from[fitted.empty() ? round[given] : point_of[given]];
-        const Vector3f to_camera = (camera - surface.middle).cast<float>() - surface.tree[i];
-        Vector3f& normal = surface.normals[i];
-        if (normal.dot(to_camera) < 0)
-            normal = -normal;
+    sides_.turn_to(surface, [&](std::size_t index) {
+        const std::size_t given = surface.tree.original(index);
+        return cloud_.seen_from[fitted.empty() ? round[given] : point_of[given]];
     });
-    sides_.orientation.kind = NormalOrientation::Kind::viewpoint;
-    sides_.orientation.why = "the cameras that saw them";
 }
 
 void CloudWork::doubt_lines(const CloudSurface& surface) {

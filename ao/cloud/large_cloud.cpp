@@ -240,16 +240,28 @@ class LargeCloud {
         return places;
     }
 
+    /// Of these points, where it is known.
+    [[nodiscard]] std::vector<Vector3d> seen_from_of(const std::vector<std::uint32_t>& numbers) const {
+        const std::span<const Vector3d> all = source_.seen_from();
+        std::vector<Vector3d> some(all.empty() ? 0 : numbers.size());
+        for (std::size_t k = 0; k < some.size(); ++k)
+            some[k] = all[numbers[k]];
+        return some;
+    }
+
     /// On a sample of the whole; tiles follow.
     void settle_sides() {
         std::vector<Vector3d> points, normals;
+        std::vector<std::uint32_t> numbers;
         for (const CloudSample::Point& each : sample_) {
+            numbers.push_back(each.number);
             points.push_back(each.point);
             if (source_.has_normals())
                 normals.push_back(each.normal.cast<double>());
         }
         sample_ = {};
-        const PointSet some{points, normals, {}, source_.z_up()};
+        const std::vector<Vector3d> seen_from = seen_from_of(numbers);
+        const PointSet some{points, normals, {}, source_.z_up(), false, seen_from};
         CloudWork work = CloudWork::of_part(setup_, some, source_.scanner(), whole_.decisions);
         whole_.sides = work.settle_sides();
         whole_.normals_refused = work.normals_refused();
@@ -299,7 +311,8 @@ class LargeCloud {
         values.round = round.numbers.size();
         if (std::ranges::none_of(round.in_core, [](char core) { return core != 0; }))
             return values;
-        const PointSet set{round.points, round.normals, {}, source_.z_up()};
+        const std::vector<Vector3d> seen_from = seen_from_of(round.numbers);
+        const PointSet set{round.points, round.normals, {}, source_.z_up(), false, seen_from};
         CloudWork work = CloudWork::of_tile(setup_, set, whole_);
         CloudWork::TileResult found = work.run_tile(round.in_core);
         collect(values, round, found.values);
@@ -323,7 +336,8 @@ class LargeCloud {
         TileValues values;
         values.checked = true;
         const TilePoints strays = store_.points(strays_tile_);
-        const PointSet set{strays.points, strays.normals};
+        const std::vector<Vector3d> seen_from = seen_from_of(strays.numbers);
+        const PointSet set{strays.points, strays.normals, {}, false, false, seen_from};
         PointVisibility found;
         if (strays.numbers.size() >= CloudWork::fewest_strays)
             found =
@@ -385,7 +399,8 @@ class LargeCloud {
             if (whole_.recorded_kept)
                 options.normals = CloudNormals::recorded;
             const CloudSetup setup{options, nullptr, setup_.up, setup_.viewpoint};
-            const PointSet set{kept.points, kept.normals, {}, source_.z_up()};
+            const std::vector<Vector3d> seen_from = seen_from_of(kept.numbers);
+            const PointSet set{kept.points, kept.normals, {}, source_.z_up(), false, seen_from};
             CloudWork some = CloudWork::of_part(setup, set, source_.scanner(), whole_.decisions);
             const PointVisibility thinned = some.run();
             part.emplace(kept.points, whole, thinned.visibility, check_);
@@ -493,6 +508,7 @@ class PointsInMemory final : public PointSource {
     [[nodiscard]] bool has_normals() const override { return !cloud_.normals.empty(); }
     [[nodiscard]] bool z_up() const override { return cloud_.z_up; }
     [[nodiscard]] std::optional<Vector3d> scanner() const override { return scanner_; }
+    [[nodiscard]] std::span<const Vector3d> seen_from() const override { return cloud_.seen_from; }
 
   private:
     const PointSet& cloud_;

@@ -29,6 +29,8 @@ class PointSource {
     [[nodiscard]] virtual bool has_normals() const = 0;
     [[nodiscard]] virtual bool z_up() const = 0;
     [[nodiscard]] virtual std::optional<Eigen::Vector3d> scanner() const = 0;
+    /// As PointSet has it.
+    [[nodiscard]] virtual std::span<const Eigen::Vector3d> seen_from() const { return {}; }
 };
 
 /// Points of a tile by number, ascending.

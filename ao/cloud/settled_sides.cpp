@@ -111,6 +111,20 @@ std::vector<float> SettledSides::settle(CloudSurface& surface, std::optional<Dis
     return std::move(found.confidence);
 }
 
+void SettledSides::turn_to(CloudSurface& surface, const std::function<Vector3d(std::size_t)>& seen_from) {
+    std::vector<std::int8_t> sign(surface.size(), 1);
+    tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
+        const Vector3f there = (seen_from(i) - surface.middle).cast<float>() - surface.tree[i];
+        if (surface.normals[i].isZero())
+            surface.normals[i] = there.stableNormalized();
+        else if (surface.normals[i].dot(there) < 0)
+            sign[i] = -1;
+    });
+    turn(surface, sign, "they faced away from where their points were seen from");
+    orientation.kind = NormalOrientation::Kind::viewpoint;
+    orientation.why = "the position that each point was seen from";
+}
+
 void SettledSides::decide_by_scanner(const CloudSurface& surface, Sides& found) const {
     constexpr double most = 0.85;
     if (!found.doubt || !seen_from)

@@ -4,6 +4,7 @@
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/sides/sides.h"
 
+#include <functional>
 #include <future>
 #include <optional>
 #include <span>
@@ -36,6 +37,10 @@ class SettledSides {
     /// where the recorded sides are taken. `rays` are made of the surface if they are needed. `recorded`: the normals
     /// are recorded ones.
     std::vector<float> settle(CloudSurface& surface, std::optional<DiscRays>& rays, bool recorded);
+
+    /// Each normal to where its point was seen from: no side is wrong then. `seen_from(index)`: by index in the tree.
+    /// What has no plane faces there, too.
+    void turn_to(CloudSurface& surface, const std::function<Eigen::Vector3d(std::size_t)>& seen_from);
 
   private:
     [[nodiscard]] Sides found_in(const CloudSurface& surface, const Patches& patches, std::optional<DiscRays>& rays,

@@ -67,8 +67,10 @@ PointVisibility visibility_of_points(const Frame& frame, PointMethod& method) {
     const auto triangles = triangles_of(cloud);
     // A sweep's pose is its scanner's. A viewpoint in a file is as often what the program writes that knows none.
     const bool from_scanner = frame.world_from_camera && !(cloud.records && cloud.records->viewpoint);
-    PointVisibility found =
-        method.compute({cloud.points, normals, triangles, z_is_up(cloud), from_scanner}, scanner_of(frame));
+    PointSet set{cloud.points, normals, triangles, z_is_up(cloud), from_scanner};
+    if (cloud.records)
+        set.stations = cloud.records->stations;
+    PointVisibility found = method.compute(set, scanner_of(frame));
     if (normals.empty() && cloud.records && normal_fields(*cloud.records))
         found.notes.emplace_back("the file's normals are not used: fewer than nine in ten points have one.");
     if (const std::string unit = cloud.records ? unit_of(*cloud.records) : ""; !unit.empty())

@@ -155,6 +155,7 @@ SceneCloud scanned_cloud(const World& world, std::size_t count, const ScannerOpt
                         static_cast<std::size_t>(row)] =
                     record(world, eye, grid.direction(column, row), options, seed, station, column, row);
         });
+        cloud.starts.push_back(cloud.points.size());
         for (const Record& made : records)
             if (made.met) {
                 cloud.points.push_back(moved * made.at);

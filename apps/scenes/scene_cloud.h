@@ -12,6 +12,7 @@ struct SceneCloud {
     std::vector<Eigen::Vector3d> points, normals; ///< normals are zero for points on no surface
     std::vector<Eigen::Vector3d> surface = {};    ///< where the points would be without noise; empty = the points
     std::vector<Eigen::Vector3d> stations = {};   ///< where a scanner stood; empty = nowhere
+    std::vector<std::size_t> starts = {};         ///< the first point of each station
 };
 
 /// `count` points of equal density on the tessellated surfaces, within the box that is seen from the walk. Each point

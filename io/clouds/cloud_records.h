@@ -2,6 +2,7 @@
 #pragma once
 
 #include "io/clouds/laz/laz.h"
+#include "projection/base/station.h"
 
 #include <array>
 #include <cstdint>
@@ -65,7 +66,8 @@ struct CloudRecords {
     std::vector<laz::Chunk> octree; ///< COPC: the chunks as the file has them, its nodes; empty for other files
     std::string octree_damage;      ///< COPC: a sentence on why the octree is not kept; empty where it is
     double colour_step = 0;         ///< the divisor of colours, where these are a part of the file; 0 = they tell it
-    std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera, if the PCD has one
+    std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera, if the file has one
+    std::vector<Station> stations;              ///< of a file of several scans, in the order of their points
 
     [[nodiscard]] bool text() const { return encoding == Encoding::ascii; }
     /// Point `index`'s bytes; for text what lies between the last word before it and its own last word.

@@ -345,6 +345,11 @@ CloudRecords read_contents(std::string_view bytes, const fs::path& file, std::ve
         viewpoint.translation() = scans[0].file_from_scan.translation();
         records.viewpoint = viewpoint;
     } else {
+        std::size_t begin = 0;
+        for (const Scan& scan : scans) {
+            records.stations.push_back({begin, scan.file_from_scan.translation()});
+            begin += scan.count;
+        }
         warnings.push_back(fmt::format("{}: {} scans are read as one cloud; the field scan tells them apart.",
                                        file.string(), scans.size()));
     }

@@ -373,9 +373,8 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file, std::vector<
     records.points.reserve(bytes.size() - header.length);
     std::size_t scans = 0, at = header.length, behind = header.length; // `behind` the last word that was read
     int line = 1 + static_cast<int>(PtxHeader::lines);
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.translation() = header.world_from_scan.topRightCorner<3, 1>();
     for (cv::Size grid;; ++scans) {
+        records.stations.push_back({records.point_count, header.world_from_scan.topRightCorner<3, 1>()});
         const std::string scan = scans == 0 ? "" : fmt::format("scan {}: ", scans + 1);
         TextRecords lines(bytes.substr(at), line);
         const std::uint64_t expected = header.points(), before = records.point_count;
@@ -421,11 +420,12 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file, std::vector<
         line += static_cast<int>(PtxHeader::lines);
     }
     records.after = bytes.substr(behind);
-    if (scans == 0)
-        records.viewpoint = pose;
-    else
-        warnings.push_back(fmt::format("{}: {} scans are read as one cloud; where each scanner stood is not used.",
-                                       file.string(), scans + 1));
+    if (scans == 0) {
+        records.viewpoint = Eigen::Isometry3d(Eigen::Translation3d(records.stations[0].position));
+        records.stations.clear();
+    } else {
+        warnings.push_back(fmt::format("{}: {} scans are read as one cloud.", file.string(), scans + 1));
+    }
     return records;
 }
 

@@ -124,7 +124,7 @@ TEST(MergedCloud, without_a_device_cameras_tell_sides) {
         computed(cloud.points, {.radius = radius_m}, {[]() -> gpu::Device& { throw Error("no Vulkan device"); }});
     EXPECT_TRUE(any_note(found, "3 depth frames were found"));
     EXPECT_TRUE(any_note(found, "not computed as images: no Vulkan device"));
-    EXPECT_TRUE(any_note(found, "turned to the cameras that saw them"));
+    EXPECT_TRUE(any_note(found, "turned to the position that each point was seen from"));
     EXPECT_LT(rmse(found.visibility, cloud.truth), 0.12);
 }
 
@@ -154,7 +154,7 @@ TEST(MergedCloud, images_that_are_mostly_holes_tell_sides_and_no_more) {
     const PointVisibility found = computed(part);
     EXPECT_TRUE(any_note(found, "2 depth frames were found"));
     EXPECT_TRUE(any_note(found, "of their pixels hold points"));
-    EXPECT_TRUE(any_note(found, "turned to the cameras that saw them"));
+    EXPECT_TRUE(any_note(found, "turned to the position that each point was seen from"));
 }
 
 TEST(MergedCloud, millimetres_are_seen_as_metres) {

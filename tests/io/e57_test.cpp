@@ -194,6 +194,10 @@ TEST(E57, several_scans_are_one_cloud_with_a_field_that_tells_them_apart) {
     EXPECT_TRUE(warned(warnings, "3 scans are read as one cloud"));
     ASSERT_EQ(cloud.points.size(), 5U);
     EXPECT_EQ(cloud.points[3], Eigen::Vector3d(100, 100.25, 107.5));
+    ASSERT_EQ(cloud.records->stations.size(), 3U);
+    EXPECT_EQ(cloud.records->stations[1].first, 3U);
+    EXPECT_EQ(cloud.records->stations[1].position, Eigen::Vector3d(0, 0, 7));
+    EXPECT_EQ(cloud.records->stations[2].first, 5U) << "a scan without points";
     EXPECT_EQ(value(cloud, 2, "scan"), 0);
     EXPECT_EQ(value(cloud, 3, "scan"), 1);
     EXPECT_EQ(value(cloud, 2, "intensity"), 0);

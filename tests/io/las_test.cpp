@@ -422,6 +422,7 @@ TEST(TextClouds, ptx_is_a_grid_placed_by_its_matrix) {
     EXPECT_EQ(cloud.points[0], Eigen::Vector3d(10, 21, 30)); // row vector times matrix: x turns to y
     EXPECT_TRUE(cloud.points[1].array().isNaN().all());
     EXPECT_EQ(cloud.records->viewpoint->translation(), Eigen::Vector3d(10, 20, 30));
+    EXPECT_TRUE(cloud.records->stations.empty()) << "one scan has a viewpoint";
     const std::array values{0.5F, 0.5F, 0.5F, 0.25F};
     write_cloud(folder / "b.ptx", cloud, {{"ambient_occlusion", values}});
     EXPECT_EQ(file_bytes(folder / "b.ptx"), head + "1 0 0 0.5 0.5\n0 0 0 0.5 0.5\n0 1 0 0.5 0.5\n0 0 1 0.5 0.25\n");
@@ -459,6 +460,14 @@ TEST(TextClouds, scans_of_a_ptx_file_are_one_cloud_and_come_back_line_by_line) {
     EXPECT_EQ(cloud.points[2], Eigen::Vector3d(5 - 2, 6 + 1, 7 + 3));
     EXPECT_EQ(cloud.points[7], Eigen::Vector3d(5, 9, 7));
     EXPECT_FALSE(cloud.records->viewpoint) << "each scan has its own";
+    ASSERT_EQ(cloud.records->stations.size(), 3U);
+    for (const auto& [scan, begin, position] : {std::tuple(0, 0U, Eigen::Vector3d(10, 20, 30)),
+                                                {1, 2U, Eigen::Vector3d(5, 6, 7)},
+                                                {2, 5U, Eigen::Vector3d(5, 6, 7)}}) {
+        const Station& station = cloud.records->stations[static_cast<std::size_t>(scan)];
+        EXPECT_EQ(station.first, begin) << scan;
+        EXPECT_EQ(station.position, position) << scan;
+    }
     const std::vector<float> values{1, 2, 3, 4, 5, 6, 7, 8};
     write_cloud(folder / "b.ptx", cloud, {});
     EXPECT_EQ(file_bytes(folder / "b.ptx"), all);
