@@ -1,4 +1,5 @@
 // `scanshade inspect`: the content of a capture, and its problems, before anything is computed.
+#include "apps/cloud_facts.h"
 #include "apps/command.h"
 #include "apps/doubts/doubts.h"
 #include "apps/doubts/pose_check.h"
@@ -45,6 +46,7 @@ struct Samples {
     std::optional<Camera> camera;                                 ///< of the first frame that has one
     std::vector<std::string> warnings;
     std::vector<std::string> without_camera; ///< clouds that none could have taken, each with the reason
+    CloudFacts surveyed;                     ///< of clouds without a camera
 };
 
 /// One frame's findings; for a bad frame, the reason.
@@ -86,7 +88,7 @@ void add_depths(const ExaminedFrame& examined, Samples& samples) {
             add(z);
 }
 
-void add_frame(const ExaminedFrame& examined, Samples& samples) {
+void add_frame(const ExaminedFrame& examined, const CaptureEntry& entry, Samples& samples) {
     const Frame& frame = examined.frame;
     ++samples.frames;
     add_depths(examined, samples);
@@ -103,6 +105,8 @@ void add_frame(const ExaminedFrame& examined, Samples& samples) {
                 samples.warnings.push_back(whole);
     // The capture's own warning says so; and points in no order are seen from everywhere.
     const bool without_camera = frame.camera.pinhole.fx == 0 && (!frame.cloud || !frame.cloud->organised());
+    if (frame.cloud && without_camera)
+        samples.surveyed.add(*frame.cloud, entry.cloud, samples.warnings);
     if (samples.camera || without_camera)
         return;
     try {
@@ -111,6 +115,8 @@ void add_frame(const ExaminedFrame& examined, Samples& samples) {
         samples.camera = frame.cloud ? camera_of(frame) : frame.camera;
     } catch (const Error& none) {
         (frame.cloud ? samples.without_camera : samples.warnings).push_back(frame.name + ": " + none.what());
+        if (frame.cloud)
+            samples.surveyed.add(*frame.cloud, entry.cloud, samples.warnings);
     }
 }
 
@@ -195,7 +201,8 @@ void measure_samples(Findings& findings) {
     }
     for (const std::size_t place : first_to_last(loadable.size(), most_samples)) {
         try {
-            add_frame(findings.capture.examine(loadable[place]), findings.samples);
+            add_frame(findings.capture.examine(loadable[place]), findings.capture.entries[loadable[place]],
+                      findings.samples);
         } catch (const OutOfMemory&) {
             throw;
         } catch (const Error& failure) {
@@ -311,6 +318,9 @@ void print(const Findings& found) {
         line("cloud", description);
     if (samples.frames > 0)
         print_depth(found);
+    if (!samples.surveyed.empty())
+        for (const auto& [name, text] : samples.surveyed.lines())
+            line(name, text);
     if (const auto& camera = samples.camera ? samples.camera : capture.camera)
         line("camera", fmt::format("{} ({})", describe(*camera), camera->origin));
     else
@@ -377,6 +387,8 @@ json to_json(const Findings& found) {
         {"unusable", json::array()}};
     for (const auto& [description, count] : found.samples.clouds)
         text["clouds"].push_back(description);
+    if (!found.samples.surveyed.empty())
+        text["survey"] = found.samples.surveyed.to_json();
     for (const Problem& problem : found.problems)
         text["unusable"].push_back({{"frame", problem.frame}, {"why", problem.why}});
     return text;

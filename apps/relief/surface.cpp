@@ -5,6 +5,7 @@
 #include "apps/relief/triangles.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
+#include "io/clouds/point_classes.h"
 #include "io/images/image_check.h"
 #include "io/rasters/las_crs.h"
 #include "projection/base/error.h"
@@ -24,20 +25,6 @@ namespace {
 constexpr std::uint8_t ground = 2, key_point = 8, water = 9, road = 11;
 
 bool is_ground(std::uint8_t kind) { return kind == ground || kind == key_point || kind == water || kind == road; }
-
-/// Of LAS; empty where the file has no classes.
-std::vector<std::uint8_t> classes_of(const Cloud& cloud, const fs::path& file) {
-    if (!cloud.records || !cloud.records->field_named("classification"))
-        return {};
-    constexpr unsigned low_bits = 31; // in point formats 0 to 5 flags share the byte
-    const bool shared = !cloud.records->field_named("return_numbers").has_value();
-    std::vector<std::uint8_t> classes;
-    for (const float value : recorded_field(cloud, "classification", file)) {
-        const auto byte = static_cast<unsigned>(value);
-        classes.push_back(static_cast<std::uint8_t>(shared ? byte & low_bits : byte));
-    }
-    return classes;
-}
 
 void add(SurveyPoints& survey, const fs::path& file, bool first) {
     const Cloud cloud = read_cloud(file, survey.warnings);

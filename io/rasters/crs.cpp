@@ -17,8 +17,9 @@ namespace scanshade::rasters {
 namespace {
 
 // Keys of the GeoTIFF specification (OGC 19-008).
-constexpr int model_type = 1024, raster_type = 1025, projected_crs = 3072, projected_unit = 3076,
-              projected_unit_size = 3077, vertical_crs = 4096, vertical_unit = 4099;
+constexpr int model_type = 1024, raster_type = 1025, citation = 1026, geographic_crs = 2048, projected_crs = 3072,
+              projected_citation = 3073, projected_unit = 3076, projected_unit_size = 3077, vertical_crs = 4096,
+              vertical_unit = 4099;
 constexpr int geographic_model = 2, pixel_is_area = 1, user_defined = 32767;
 constexpr std::uint16_t here = 0, in_doubles = 34736, in_ascii = 34737; // where a value lies
 
@@ -91,6 +92,16 @@ std::optional<double> double_of(const GeoKeys& keys, int key) {
     return std::nullopt;
 }
 
+/// The text of a key in tag 34737, without the bar that ends it.
+std::string text_of(const GeoKeys& keys, int key) {
+    for (std::size_t at = 4; at + 3 < keys.directory.size(); at += 4)
+        if (keys.directory[at] == key && keys.directory[at + 1] == in_ascii) {
+            const std::string text = keys.ascii.substr(keys.directory[at + 3], keys.directory[at + 2]);
+            return text.substr(0, text.find('|'));
+        }
+    return "";
+}
+
 double usable_unit(double metres, const std::string& what) {
     if (!(metres > 0) || !std::isfinite(metres))
         throw Error(fmt::format("{} of {} metres, expected a length above 0", what, metres));
@@ -153,7 +164,10 @@ Crs crs_of_keys(GeoKeys keys) {
     Crs crs;
     crs.known = true;
     crs.geographic = value_of(keys, model_type, 0) == geographic_model;
-    crs.epsg = value_of(keys, projected_crs, 0);
+    crs.epsg = value_of(keys, crs.geographic ? geographic_crs : projected_crs, 0);
+    crs.name = text_of(keys, projected_citation);
+    if (crs.name.empty())
+        crs.name = text_of(keys, citation);
     if (crs.epsg == user_defined)
         crs.epsg = 0;
     if (!crs.geographic)
@@ -181,6 +195,8 @@ Crs crs_of_text(std::string_view text) {
         return crs;
     }
     crs.epsg = wkt::epsg_of(*horizontal);
+    if (!horizontal->values.empty())
+        crs.name = horizontal->values[0];
     if (!crs.geographic)
         crs.unit_m = usable_unit(wkt::metres_in_unit(*horizontal).value_or(unit_of_code(units_of_projected, crs.epsg)),
                                  "a unit of the well-known text");

@@ -23,6 +23,7 @@ struct Crs {
     bool known = false;             ///< false: the file names none
     bool geographic = false;        ///< coordinates are degrees
     int epsg = 0;                   ///< of the horizontal system; 0 = none is named
+    std::string name;               ///< of the horizontal system, for people; empty = none is given
     std::vector<std::string> notes; ///< sentences: what was assumed
 };
 

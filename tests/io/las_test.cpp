@@ -2,6 +2,7 @@
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "io/clouds/format.h"
+#include "io/clouds/point_classes.h"
 #include "tests/support/files.h"
 
 #include <array>
@@ -113,6 +114,37 @@ TEST(Las, withheld_points_and_noise_are_left_out_and_kept_in_the_file) {
         write_cloud(folder / "same.las", cloud, {});
         EXPECT_EQ(file_bytes(folder / "same.las"), bytes);
     }
+}
+
+TEST(Las, classes_and_returns_are_told_without_the_flags_beside_them) {
+    const TemporaryFolder folder;
+    struct Row {
+        int format;
+        int flags;      // of the first record, byte 14
+        std::size_t at; // of the class
+        int value, return_number, code;
+        const char* name;
+    };
+    for (const Row& row : {Row{0, 0x09, 15, 2, 1, 2, "ground"}, Row{1, 0xd3, 15, 0x65, 3, 5, "high vegetation"},
+                           Row{3, 0x3f, 15, 0x20, 7, 0, "never classified"}, Row{5, 0x02, 15, 31, 2, 31, "reserved"},
+                           Row{6, 0xf3, 16, 17, 3, 17, "bridge deck"}, Row{7, 0x1f, 16, 64, 15, 64, "user-defined"},
+                           Row{10, 0x21, 16, 255, 1, 255, "user-defined"}}) {
+        SCOPED_TRACE(fmt::format("format {}", row.format));
+        std::string bytes = las(4, row.format);
+        const std::size_t first = bytes.size() - 60 - 3 * base_length[static_cast<std::size_t>(row.format)];
+        bytes[first + 14] = static_cast<char>(row.flags);
+        bytes[first + row.at] = static_cast<char>(row.value);
+        std::vector<std::string> warnings;
+        const fs::path file = write_file(folder / "a.las", bytes);
+        const Cloud cloud = read_cloud(file, warnings);
+        ASSERT_EQ(classes_of(cloud, file).size(), 3U);
+        EXPECT_EQ(classes_of(cloud, file)[0], row.code);
+        EXPECT_EQ(returns_of(cloud, file)[0], row.return_number);
+        EXPECT_EQ(class_name(static_cast<std::uint8_t>(row.code)), row.name);
+    }
+    const fs::path text = write_file(folder / "a.xyz", "1 2 3\n4 5 6\n");
+    EXPECT_TRUE(classes_of(read(text), text).empty());
+    EXPECT_TRUE(returns_of(read(text), text).empty());
 }
 
 const std::array visibility{0.25F, 0.5F, std::numeric_limits<float>::quiet_NaN()}, confidence{1.0F, 0.75F, 0.0F};

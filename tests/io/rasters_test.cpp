@@ -486,6 +486,22 @@ TEST(Rasters, cut_files_are_refused_wherever_they_end) {
     }
 }
 
+TEST(Rasters, systems_have_the_names_that_files_give) {
+    const std::string text = "UTM 33N|WGS 84|";
+    const auto crs = [&](std::vector<std::uint16_t> directory) {
+        directory.insert(directory.begin(), {1, 1, 0, static_cast<std::uint16_t>(directory.size() / 4)});
+        return crs_of_keys({std::move(directory), {}, text});
+    };
+    const Crs projected = crs({1024, 0, 1, 1, 1026, 34737, 7, 8, 3072, 0, 1, 32633, 3073, 34737, 8, 0});
+    EXPECT_EQ(projected.name, "UTM 33N");
+    EXPECT_EQ(projected.epsg, 32633);
+    const Crs geographic = crs({1024, 0, 1, 2, 1026, 34737, 7, 8, 2048, 0, 1, 4326});
+    EXPECT_EQ(geographic.name, "WGS 84");
+    EXPECT_EQ(geographic.epsg, 4326);
+    EXPECT_EQ(crs({1024, 0, 1, 1, 3072, 0, 1, 32633}).name, "");
+    EXPECT_EQ(crs_of_text(R"(GEOGCS["WGS 84",UNIT["degree",0.0174],AUTHORITY["EPSG","4326"]])").name, "WGS 84");
+}
+
 TEST(Rasters, units_follow_keys_codes_and_texts) {
     EXPECT_EQ(crs_of_keys(utm_33()).unit_m, 1);
     const auto of_code = [](int code) { return crs_of_keys(with_value(with_value({}, 1024, 1), 3072, code)); };
@@ -499,6 +515,7 @@ TEST(Rasters, units_follow_keys_codes_and_texts) {
     const Crs compound = crs_of_text(
         R"(COMPD_CS["a + b",PROJCS["a",GEOGCS["g",UNIT["degree",0.0174],AUTHORITY["EPSG","4258"]],UNIT["metre",1,AUTHORITY["EPSG","9001"]],AUTHORITY["EPSG","25832"]],VERT_CS["b",VERT_DATUM["d",2005],UNIT["US survey foot",0.304800609601219],AUTHORITY["EPSG","6360"]]])");
     EXPECT_EQ(compound.epsg, 25832);
+    EXPECT_EQ(compound.name, "a");
     EXPECT_EQ(compound.unit_m, 1);
     EXPECT_NEAR(compound.height_unit_m, 0.3048006, 1e-7);
     EXPECT_EQ(value_of(compound.keys, 3072, 0), 25832);
