@@ -50,6 +50,9 @@ class Refine final : public Command {
         const auto format = out_.empty() ? CameraFormat::scanshade : camera_format(out_, format_);
         refuse_to_overwrite();
         const Stopwatch stopwatch;
+        refinement_.report_to([&stopwatch](const std::string& what) {
+            fmt::print(stderr, "  {:5.1f} s  {}\n", stopwatch.seconds(), what);
+        });
         const RecordingResult found = refinement_.refine(path);
         const double took_s = stopwatch.seconds();
         fmt::print("{}", summary_of(found.refinement, took_s));

@@ -77,9 +77,12 @@ std::vector<std::size_t> evenly_spaced(std::size_t all, std::size_t most) {
 
 /// Loads evenly spaced frames. A frame that cannot be loaded with the images needed gets a note.
 RecordingData recording_data(const Capture& capture, const std::vector<std::size_t>& wanted,
-                             const RecordingOptions& recording, bool with_colour) {
+                             const RecordingOptions& recording, bool with_colour, const SelectionOptions& selection) {
     RecordingData data{.frames = {}, .stamps_s = {}, .notes = capture.warnings};
     std::string first_failure;
+    if (selection.say)
+        selection.say(fmt::format("reading {} of {} frames",
+                                  std::min(wanted.size(), static_cast<std::size_t>(recording.frames)), wanted.size()));
     for (const std::size_t position : evenly_spaced(wanted.size(), static_cast<std::size_t>(recording.frames))) {
         const std::size_t index = wanted[position];
         const CaptureEntry& entry = capture.entries[index];
@@ -97,6 +100,15 @@ RecordingData recording_data(const Capture& capture, const std::vector<std::size
         throw Error(fmt::format("{}: {} frames with {}depth, at least {} expected{}", capture.path.string(),
                                 data.frames.size(), with_colour ? "colour and " : "", least, first_failure));
     return data;
+}
+
+/// How recordings get observations that tell more.
+std::string what_helps(std::size_t recorded, std::size_t used, bool with_colour) {
+    return fmt::format("What helps: frames that show {} up to the corners of the image, from near and far, with the "
+                       "camera turned and tilted in between{}; or pictures of a chessboard (--board).",
+                       with_colour ? "things with texture" : "walls, floor and tables of several directions",
+                       used < recorded ? fmt::format("; more of the {} frames (--frames, now {})", recorded, used)
+                                       : "");
 }
 
 /// Frames midway between those of recording_data(); frames that cannot be loaded are left out.
@@ -346,7 +358,13 @@ RecordingResult refine_from_recording(Capture capture, const std::vector<std::si
         recording.registered == "auto" ? capture.registration != Registration::no : recording.registered == "yes";
     if (!how.registered)
         capture.depth_correction = correction;
-    RecordingData data = recording_data(capture, wanted, recording, with_colour);
+    RecordingData data = recording_data(capture, wanted, recording, with_colour, options.selection);
+    options.what_helps = what_helps(wanted.size(), data.frames.size(), with_colour);
+    options.what_contradicts =
+        "The frames contradict each other: things that moved, blur, colour that does not belong to "
+        "the depth (--registered no), or recorded poses that are off (--poses ignore).";
+    if (options.selection.say)
+        options.selection.say(with_colour ? "following points through the images" : "looking for planes in the depth");
     const cv::Size depth_size = data.frames.front().depth_m.size();
     options.selection.guessed = set_first_camera(capture, first, how.registered, depth_size);
     options.selection.folds = std::min(options.selection.folds, 4);

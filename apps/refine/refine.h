@@ -5,6 +5,7 @@
 #include "apps/refine/recording.h"
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,8 @@ class RefineSettings {
     /// Refines from pictures of a board if `board` is set, else from a capture. Throws Misuse for a setting, Error
     /// where no camera can be found.
     [[nodiscard]] RecordingResult refine(const std::filesystem::path& path);
+    /// Takes sentences about what is being done; none: nobody waits for it.
+    void report_to(std::function<void(const std::string&)> say) { options_.selection.say = std::move(say); }
 
   private:
     [[nodiscard]] calibration::Refinement from_boards(const std::filesystem::path& folder) const;

@@ -99,47 +99,69 @@ std::string doubt_of_kept_focal_length(const Selection& found, double most_sigma
     return {};
 }
 
-} // namespace
+/// Why a result is doubtful, and what a person can do about it.
+struct Doubt {
+    std::string why, advice;
+};
 
-std::string verdict_of(const Refinement& r) {
+std::vector<Doubt> doubts_of(const Refinement& r) {
     constexpr double most_px = 1, most_sigma_px = 0.5, most_over_fitted = 2, least_coverage = 0.4;
     const Selection& found = r.selection;
     if (found.steps.empty())
-        return "doubtful: the views determine nothing, so the camera is as it was before.";
+        return {{"the views determine nothing, so the camera is as it was before", r.what_helps}};
     const bool pixels = r.unit == "px";
     const double sigma_px = mean_pixel_sigma(found.fit);
     const auto outlying =
         std::count_if(r.views.begin(), r.views.end(), [](const ViewRow& view) { return view.outlying && view.used; });
-    std::vector<std::string> doubts;
+    std::vector<Doubt> doubts;
     if (pixels && found.held_out_px > most_px)
-        doubts.push_back(fmt::format("held-out views are off by {:.2g} px", found.held_out_px));
+        doubts.push_back({fmt::format("held-out views are off by {:.2g} px", found.held_out_px), r.what_contradicts});
     else if (found.held_out_px > most_over_fitted * found.train_px && (!pixels || found.held_out_px > 0.1))
-        doubts.push_back(fmt::format("held-out views are {:.1f} times as far off as fitted ones",
-                                     found.held_out_px / found.train_px));
+        doubts.push_back({fmt::format("held-out views are {:.1f} times as far off as fitted ones",
+                                      found.held_out_px / found.train_px),
+                          r.what_helps});
     if (sigma_px > most_sigma_px)
-        doubts.push_back(fmt::format("a pixel is known to {:.2g} px only", sigma_px));
+        doubts.push_back({fmt::format("a pixel is known to {:.2g} px only", sigma_px), r.what_helps});
     else if (const std::string doubt = doubt_of_kept_focal_length(found, most_sigma_px); !doubt.empty())
-        doubts.push_back(doubt);
+        doubts.push_back({doubt, r.what_helps});
     if (outlying > 0)
         doubts.push_back(
-            fmt::format("{} of {} views {} outlying", outlying, r.views.size(), outlying == 1 ? "is" : "are"));
+            {fmt::format("{} of {} views {} outlying", outlying, r.views.size(), outlying == 1 ? "is" : "are"),
+             "--outliers drop leaves outlying views out."});
     if (r.coverage.share < least_coverage)
-        doubts.push_back(fmt::format("{:.0f} % of the image hold observations", 100 * r.coverage.share));
+        doubts.push_back(
+            {fmt::format("{:.0f} % of the image hold observations", 100 * r.coverage.share), r.what_helps});
+    return doubts;
+}
+
+/// Each piece of advice once.
+std::vector<std::string> advice_of(const Refinement& r) {
+    std::vector<std::string> advice;
+    for (const Doubt& doubt : doubts_of(r))
+        if (!doubt.advice.empty() && std::ranges::find(advice, doubt.advice) == advice.end())
+            advice.push_back(doubt.advice);
+    return advice;
+}
+
+} // namespace
+
+std::string verdict_of(const Refinement& r) {
+    std::vector<std::string> doubts;
+    for (const Doubt& doubt : doubts_of(r))
+        doubts.push_back(doubt.why);
     if (!doubts.empty())
         return fmt::format("doubtful: {}.", fmt::join(doubts, "; "));
-    const std::string error = fmt::format("held-out views are off by {:.2g} {}", found.held_out_px, r.unit);
-    return r.changed() ? fmt::format("sound: {}, and a pixel is known to {:.2g} px.", error, sigma_px)
-                       : fmt::format("sound: {}, and nothing asks for another camera.", error);
+    const std::string error = fmt::format("held-out views are off by {:.2g} {}", r.selection.held_out_px, r.unit);
+    return r.changed()
+               ? fmt::format("sound: {}, and a pixel is known to {:.2g} px.", error, mean_pixel_sigma(r.selection.fit))
+               : fmt::format("sound: {}, and nothing asks for another camera.", error);
 }
 
 std::string status_of(const Refinement& r) { return r.changed() ? "refined" : "unchanged"; }
 
 json details_of(const Refinement& r, double took_s) {
-    json text{{"status", status_of(r)},
-              {"verdict", verdict_of(r)},
-              {"source", r.source},
-              {"took_s", took_s},
-              {"error_unit", r.unit}};
+    json text{{"status", status_of(r)}, {"verdict", verdict_of(r)}, {"advice", advice_of(r)},
+              {"source", r.source},     {"took_s", took_s},         {"error_unit", r.unit}};
     text["before"] = to_json(r.before);
     for (const NumberRow& row : numbers_of(r))
         text["numbers"][row.name] = {{"before", row.before}, {"after", row.after}, {"sigma", finite(row.sigma)}};
@@ -166,7 +188,10 @@ json details_of(const Refinement& r, double took_s) {
 }
 
 std::string summary_of(const Refinement& r, double took_s) {
-    std::string text = fmt::format("{}: {} ({:.1f} s)\n{}\n\n", status_of(r), r.source, took_s, verdict_of(r));
+    std::string text = fmt::format("{}: {} ({:.1f} s)\n{}\n", status_of(r), r.source, took_s, verdict_of(r));
+    for (const std::string& advice : advice_of(r))
+        text += advice + "\n";
+    text += "\n";
     text += fmt::format("  {:<14} {:>12} {:>12} {:>10}\n", "", "before", "after", "sigma");
     for (const NumberRow& row : numbers_of(r))
         text += fmt::format("  {:<14} {:>12.6g} {:>12.6g} {:>10}\n", row.name, row.before, row.after,
@@ -301,8 +326,9 @@ std::string page_of(const Refinement& r, double took_s) {
 
     std::string found =
         page::paragraph(verdict_of(r)) + page::paragraph(fmt::format("From {}; {:.1f} s.", r.source, took_s));
-    for (const std::string& note : r.notes)
-        found += page::paragraph(note);
+    for (const std::vector<std::string>& sentences : {advice_of(r), r.notes})
+        for (const std::string& sentence : sentences)
+            found += page::paragraph(sentence);
     std::vector<page::Section> sections = {
         {"Found", found},
         {"Numbers", page::table({"number", "before", "after", "sigma"}, numbers)},

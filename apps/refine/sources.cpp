@@ -155,6 +155,12 @@ Refinement refine_from_boards(const fs::path& folder, const Target& target, cons
             fmt::format("{}: no {} found in any of {} pictures", folder.string(), text_of(target), pictures.size()));
     const auto given = given_camera(first.camera, first.fov_degrees, first.lens, size);
     options.selection.guessed = !given;
+    options.what_helps =
+        "What helps: more pictures, with the board tilted by 30 to 45 degrees to all sides, and so near "
+        "that it reaches the corners of the image.";
+    options.what_contradicts =
+        "The pictures contradict each other: blur, a shutter that rolls while the camera moves, or a "
+        "board that is not flat.";
     const Camera before = given ? *given : first_guess(views, folder / views.front().name, first.lens, size);
     Boards boards(views);
     const std::string why_not = degeneracy(views, boards.start(model_of(before)));
@@ -192,6 +198,7 @@ Refinement refine_from_clouds(const Capture& capture, const std::vector<std::siz
     const cv::Size size = problem.size();
     const auto given = given_camera(first.camera, first.fov_degrees, first.lens, size);
     options.selection.guessed = !given;
+    options.what_helps = "What helps: clouds whose points fill the grid up to its corners.";
     const Camera before = given ? *given : guessed_camera({}, first.lens, size);
     Refinement result = refine(problem, before, camera_groups(before.distortion.model), options, "");
     result.source = fmt::format("pixels and points of {} organised cloud{}", used, used == 1 ? "" : "s");

@@ -250,8 +250,11 @@ class ModelSelection {
     enum class Outcome { freed, rejected, folds };
 
     void record(const std::vector<std::size_t>& indices, bool freed, const std::string& why) {
-        for (const std::size_t index : indices)
+        for (const std::size_t index : indices) {
             selection_.steps[index] = {std::string(groups_[index].name), freed, why};
+            if (options_.say)
+                options_.say(fmt::format("{}: {}{}", groups_[index].name, freed ? "freed, " : "", why));
+        }
     }
 
     /// Frees the groups' numbers at once, if they pass the tests.

@@ -3,6 +3,7 @@
 
 #include "projection/calibration/problem.h"
 
+#include <functional>
 #include <optional>
 
 namespace scanshade::calibration {
@@ -23,6 +24,7 @@ struct SelectionOptions {
     double worst_condition = 1e7; ///< of the free numbers' correlation matrix
     double enough_px = 1e-3;      ///< an error below this needs no better model
     bool guessed = false;         ///< the first camera is a guess: its focal length holds no information to keep
+    std::function<void(const std::string&)> say = {}; ///< takes each decision as it is made; none: nobody waits for it
 };
 
 struct Selection {

@@ -47,6 +47,13 @@ std::string names_of_outlying(const std::vector<ViewRow>& rows, const std::strin
     return fmt::format("{}{}", fmt::join(names, ", "), more);
 }
 
+std::string why_not_free(Unknown unknown, const std::vector<ParameterGroup>& groups, const Selection& selection) {
+    for (std::size_t i = 0; i < groups.size(); ++i)
+        if (groups[i].unknowns.front() == unknown)
+            return selection.steps[i].why;
+    return "not asked for";
+}
+
 } // namespace
 
 Refinement refine(Problem& problem, const Camera& before, const std::vector<ParameterGroup>& groups,
@@ -57,10 +64,12 @@ Refinement refine(Problem& problem, const Camera& before, const std::vector<Para
 Refinement refine(Problem& problem, const Model& first, const Camera& before, const std::vector<ParameterGroup>& groups,
                   const RefineOptions& options, const std::string& degeneracy) {
     if (!degeneracy.empty() && options.selection.guessed)
-        throw Error("no camera can be found: " + degeneracy);
+        throw Error(fmt::format("no camera can be found: {}. {}", degeneracy, options.what_helps));
     Refinement result;
     result.before = before;
     result.unit = problem.unit();
+    result.what_helps = options.what_helps;
+    result.what_contradicts = options.what_contradicts;
     Views used(problem.views(), true);
     const Fit start = problem.start(first);
     if (!degeneracy.empty()) {
@@ -99,7 +108,9 @@ Refinement refine(Problem& problem, const Model& first, const Camera& before, co
             result.full = full_model(problem, result.selection.fit, groups, used, options.selection);
     }
     if (options.selection.guessed && !result.selection.free[f])
-        throw Error("no camera can be found: " + result.selection.steps.front().why);
+        throw Error(fmt::format("no camera can be found, since the focal length is {}. {} A first camera (--camera) "
+                                "stays where the views cannot better it.",
+                                why_not_free(f, groups, result.selection), options.what_helps));
     result.after = result.changed() ? camera_of(result.selection.fit.model, "refined") : before;
     std::vector<cv::Point2d> observed;
     for (std::size_t i = 0; i < problem.views(); ++i) {

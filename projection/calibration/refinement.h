@@ -15,6 +15,9 @@ struct RefineOptions {
     SelectionOptions selection;
     Outliers outliers = Outliers::keep;
     ModelChoice model = ModelChoice::selected;
+    // Sentences for people.
+    std::string what_helps = {};       ///< how to get observations that tell more
+    std::string what_contradicts = {}; ///< where views that contradict each other come from
 };
 
 /// One view's row in the report.
@@ -26,8 +29,9 @@ struct ViewRow {
 };
 
 struct Refinement {
-    std::string source; ///< "chessboard of 9x6 corners, 25 mm, in 13 images"
-    std::string unit;   ///< of its errors: px, or mm of depth
+    std::string source;                       ///< "chessboard of 9x6 corners, 25 mm, in 13 images"
+    std::string unit;                         ///< of its errors: px, or mm of depth
+    std::string what_helps, what_contradicts; ///< as RefineOptions has them
     Camera before, after;
     Selection selection;
     std::optional<Selection> full; ///< the full model on the same views, for comparison

@@ -320,6 +320,28 @@ TEST(Boards, TheVerdictDoubtsOutlyingViewsAndViewsThatDetermineNothing) {
     Boards one_bad(views);
     EXPECT_TRUE(says(verdict_of(refine(one_bad, plain, groups, {}, "")), "1 of 10 views is outlying"));
     EXPECT_TRUE(says(verdict_of(refine(sound, plain, groups, {}, "the same tilt")), "doubtful: the views determine"));
+    EXPECT_TRUE(
+        says(summary_of(refine(one_bad, plain, groups, {}, ""), 1), "--outliers drop leaves outlying views out."));
+}
+
+TEST(Boards, WhatHelpsIsSaidOfDoubtfulResultsAndWhereNoCameraIsFound) {
+    std::mt19937 random(9);
+    Boards boards(boards_seen_by(plain, 10, 0.1, random));
+    const std::vector<ParameterGroup> groups = camera_groups(LensModel::brown_conrady);
+    std::vector<std::string> said;
+    RefineOptions options;
+    options.what_helps = "More pictures help.";
+    options.selection.say = [&](const std::string& what) { said.push_back(what); };
+    EXPECT_TRUE(says(summary_of(refine(boards, plain, groups, options, "the same tilt"), 1), "More pictures help."));
+    EXPECT_FALSE(says(summary_of(refine(boards, plain, groups, options, ""), 1), "More pictures help.")) << "sound";
+    EXPECT_GE(said.size(), groups.size());
+    EXPECT_TRUE(says(said.front(), std::string(groups.front().name)));
+    options.selection.guessed = true;
+    EXPECT_EQ(refusal([&] { (void)refine(boards, plain, groups, options, "the same tilt"); }),
+              "no camera can be found: the same tilt. More pictures help.");
+    const std::vector<ParameterGroup> others{{"cx, cy", {cx, cy}}}; // their reasons are not the focal length's
+    EXPECT_TRUE(says(refusal([&] { (void)refine(boards, plain, others, options, ""); }),
+                     "no camera can be found, since the focal length is not asked for. More pictures help."));
 }
 
 } // namespace
