@@ -259,7 +259,7 @@ class DepthFrames {
                                    : integers         ? "mm"
                                                       : "m",
                                    depth_.depth_scale ? "--depth-scale" : "assumed");
-        encoding_.stated = depth_.depth_scale != nullptr;
+        encoding_.stated = encoding_.by_hand = depth_.depth_scale != nullptr;
         camera_ = camera_from(depth_.camera, size());
         listing_.kind = name_of(FormatKind::depth_image);
         listing_.camera = camera_;

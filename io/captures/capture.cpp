@@ -34,6 +34,7 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
         take_colour(capture, options.colour);
     if (!options.depth_scale.empty()) {
         capture.depth = depth_encoding(options.depth_scale, "--depth-scale");
+        capture.depth.by_hand = true;
         for (CaptureEntry& entry : capture.entries)
             entry.depth_units_per_metre = 0;
     }

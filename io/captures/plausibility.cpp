@@ -243,7 +243,8 @@ int common_divisor(const cv::Mat& stored) {
 /// assumed (a sensor's millimetres stored as TUM does: 5), or rotated bits (SUN RGB-D: 8).
 void doubt_steps(const cv::Mat& stored, const DepthEncoding& encoding, std::vector<std::string>& doubts) {
     constexpr double largest_mm = 1.5;
-    if (encoding.stated || stored.type() != CV_16UC1 || encoding.kind != DepthEncoding::Kind::linear)
+    if ((encoding.stated && !encoding.by_hand) || stored.type() != CV_16UC1 ||
+        encoding.kind != DepthEncoding::Kind::linear)
         return;
     const int divisor = common_divisor(stored);
     if (const double step_mm = 1000 * divisor / encoding.units_per_metre; divisor > 1 && step_mm > largest_mm)
@@ -290,6 +291,14 @@ bool is_stretched(const cv::Mat& stored, float largest) {
                                        : false;
 }
 
+/// Whether a person gave a unit that recordings usually have, which is as often wrong as an assumed one. Another number
+/// shows that they know better: that of a car's lidar, or of a renderer.
+bool is_usual(const DepthEncoding& encoding, const cv::Mat& stored) {
+    const double units = encoding.units_per_metre;
+    return encoding.by_hand && (stored.type() != CV_16UC1 || encoding.kind != DepthEncoding::Kind::linear ||
+                                units == 1000 || units == 5000);
+}
+
 /// `image`: depths of any kind, 0 = hole.
 std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& image, const cv::Mat& stored,
                                       const DepthEncoding& encoding) {
@@ -311,9 +320,9 @@ std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& im
         return doubts;
     }
     const bool assumed = !encoding.stated;
-    const float farthest_likely_m = !assumed                    ? farthest_median_m
-                                    : stored.type() == CV_16UC1 ? assumed_farthest_median_m
-                                                                : floats_farthest_median_m;
+    const float farthest_likely_m = !assumed && !is_usual(encoding, stored) ? farthest_median_m
+                                    : stored.type() == CV_16UC1             ? assumed_farthest_median_m
+                                                                            : floats_farthest_median_m;
     const std::string stated = fmt::format("encoding {} ({})", encoding.name, encoding.origin);
     std::vector<std::string> doubts;
     if (depth.jumps > 0.2)

@@ -20,9 +20,10 @@ struct DepthEncoding {
     };
     Kind kind = Kind::linear;
     double units_per_metre = 1000;
-    std::string name;   ///< "mm", "tum", "sun", "nyu", "m" or the number
-    std::string origin; ///< "TUM layout", "--depth-scale", "assumed: 16-bit integers are millimetres" ...
-    bool stated = true; ///< by the user or a file; otherwise it is what the layout's recordings usually have
+    std::string name;     ///< "mm", "tum", "sun", "nyu", "m" or the number
+    std::string origin;   ///< "TUM layout", "--depth-scale", "assumed: 16-bit integers are millimetres" ...
+    bool stated = true;   ///< by the user or a file; otherwise it is what the layout's recordings usually have
+    bool by_hand = false; ///< by the user, who may be wrong where a file is not
     /// Nothing says how long a unit is, as in a reconstruction from images. Then the walk's lengths are no metres, but
     /// parts of the scene: see Capture::unit.
     bool arbitrary = false;

@@ -51,6 +51,36 @@ TEST(plausibility, multiples_show_another_unit) {
     EXPECT_TRUE(doubts(times(waves(), 5)).empty()) << "a named unit may be coarse";
 }
 
+/// What is said of waves of so many times 2 m, stored in a unit that a person gave.
+struct GivenUnit {
+    const char* name;
+    const char* unit;
+    int factor;
+    const char* doubt; ///< a part of it; empty = none
+};
+void PrintTo(const GivenUnit& row, std::ostream* to) { *to << row.name; }
+class UnitsGivenByHand : public testing::TestWithParam<GivenUnit> {};
+
+TEST_P(UnitsGivenByHand, are_doubted_where_sensors_have_other_ranges_or_steps) {
+    const auto& [name, unit, factor, doubt] = GetParam();
+    DepthEncoding given = depth_encoding(unit, "--depth-scale");
+    given.by_hand = true;
+    const auto found = doubts(times(waves(), factor), given);
+    if (*doubt == 0)
+        EXPECT_TRUE(found.empty()) << tests::joined(found);
+    else
+        EXPECT_TRUE(warned(found, doubt)) << tests::joined(found);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Of, UnitsGivenByHand,
+    testing::Values(GivenUnit{"right_mm", "mm", 1, ""}, GivenUnit{"right_tum", "tum", 5, ""},
+                    GivenUnit{"right_number", "1000", 1, ""}, GivenUnit{"coarse_in_mm", "mm", 4, "multiples of 4 mm"},
+                    GivenUnit{"coarse_in_1000", "1000", 4, "multiples of 4 mm"},
+                    GivenUnit{"tum_as_mm", "mm", 5, "implausible with encoding mm (--depth-scale)"},
+                    GivenUnit{"far_in_a_number_of_its_own", "100", 1, ""}, GivenUnit{"near", "tum", 1, ""}),
+    [](const auto& info) { return info.param.name; });
+
 TEST(plausibility, floats_in_millimetres_are_told_with_the_scale_that_suits_them) {
     cv::Mat1f millimetres;
     waves().convertTo(millimetres, CV_32F);
