@@ -143,11 +143,11 @@ INSTANTIATE_TEST_SUITE_P(
                                   "can be seen from"},
                     WrongStations{"other_scans", "outdoor", [](const Points& at) { return rotated(at); },
                                   "of the points can be seen from the position of their scan"},
-                    WrongStations{"another_origin", "outdoor",
+                    WrongStations{"deep_below", "outdoor",
                                   [](const Points& at) {
                                       return moved(at, {0, 0, -5000});
                                   },
-                                  "of the points can be seen from the position of their scan"},
+                                  "nearly all surfaces would look down"},
                     WrongStations{"one_of_six", "office",
                                   [](const Points& at) {
                                       Points positions = at;

@@ -5,6 +5,7 @@
 #include "projection/base/hash.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
@@ -47,9 +48,16 @@ struct Sample {
 /// Of the points that were looked for.
 struct Seen {
     std::size_t tests = 0, visible = 0, opposed = 0;
+    double rise = 0, level = 0; ///< sums over z of the normals that face the station, and over its amount
 
-    void add(int side) { ++tests, visible += side != 0, opposed += side < 0; }
-    void add(const Seen& others) { tests += others.tests, visible += others.visible, opposed += others.opposed; }
+    void add(int side, double z) {
+        ++tests, visible += side != 0, opposed += side < 0;
+        rise += side * z, level += std::abs(side * z);
+    }
+    void add(const Seen& others) {
+        tests += others.tests, visible += others.visible, opposed += others.opposed, rise += others.rise,
+            level += others.level;
+    }
     [[nodiscard]] double share(std::size_t part) const {
         return tests > 0 ? static_cast<double>(part) / static_cast<double>(tests) : 0;
     }
@@ -69,7 +77,7 @@ std::vector<Seen> seen_by_each(std::span<const Station> stations, const CloudSur
     std::vector<Seen> seen(stations.size());
     for (std::size_t k = 0; k < sides.size(); ++k)
         if (!surface.normals[k * step].isZero() && surface.disc_radius[k * step] > 0)
-            seen[number(k)].add(sides[k]);
+            seen[number(k)].add(sides[k], static_cast<double>(surface.normals[k * step].z()));
     return seen;
 }
 
@@ -89,6 +97,8 @@ RecordedStations recorded_stations(std::span<const Station> stations, std::span<
     // stations see 0.78 to 0.99 of all, 0.53 and more of each scan. Places from where more than 3 % of the sides would
     // be wrong see less, such as those 2 m beside, or the stations of other scans in a house of many walls.
     constexpr double most = 0.7, some = 0.4;
+    // z is up in such files. Terrain is as visible from deep below, as from heights of zero.
+    constexpr double down = -0.5;
     constexpr std::size_t enough = 50; // points of a scan that tell
     const std::vector<std::uint32_t> station = station_of_each(stations, points.size());
     const Sample sample(station, points, normals);
@@ -111,6 +121,8 @@ RecordedStations recorded_stations(std::span<const Station> stations, std::span<
         found.note = fmt::format("where the scanners stood is not used: only {:.0f} % of the points can be seen from "
                                  "the position of their scan.",
                                  100 * visible);
+    else if (all.rise < down * all.level)
+        found.note = "where the scanners stood is not used: nearly all surfaces would look down.";
     else if (seen[worst].tests >= enough && least < some)
         found.note = fmt::format("where the scanners stood is not used: only {:.0f} % of the points of scan {} can be "
                                  "seen from its position.",
