@@ -499,9 +499,9 @@ scanshade_status scanshade_capture_open(const char* path, const scanshade_settin
         require(path, "path");
         RunSettings asked;
         library::fill(asked, Purpose::capture, settings_from(settings, count));
-        auto opened = std::make_shared<const library::OpenedCapture>(
-            open_capture_at_or_below(path, {asked.camera, asked.depth_scale, asked.association_limit_s, asked.poses,
-                                            asked.colour, asked.topic, usual_median_depth, asked.confidence_min}));
+        auto opened = std::make_shared<const library::OpenedCapture>(open_capture_at_or_below(
+            path, {asked.camera, asked.depth_scale, asked.association_limit_s, asked.poses, asked.colour, asked.topic,
+                   usual_median_depth, asked.confidence_min, asked.copc}));
         require_metres(opened->capture, "the library"); // its depths and poses are
         std::string info = info_of(opened->capture);
         *capture = new scanshade_capture{std::move(opened), std::move(info)};

@@ -38,9 +38,9 @@ void refuse_metres(RunSettings& asked, Capture& capture) {
 } // namespace
 
 std::shared_ptr<OpenedCapture> Openings::opened(const fs::path& path) const {
-    Capture capture =
-        open_capture_at_or_below(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses,
-                                        asked_.colour, asked_.topic, asked_.median_depth(), asked_.confidence_min});
+    Capture capture = open_capture_at_or_below(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s,
+                                                      asked_.poses, asked_.colour, asked_.topic, asked_.median_depth(),
+                                                      asked_.confidence_min, asked_.copc});
     refuse_metres(asked_, capture);
     refuse_absent_view(asked_, capture);
     std::vector<std::size_t> frames = slice(asked_.frames, capture.entries.size());

@@ -37,6 +37,7 @@ class RunSettings {
     double association_limit_s = 0.02;
     std::string topic;
     int confidence_min = 1;
+    bool copc = true;
     Preset preset = Preset::fast;
     SequenceUse sequence = SequenceUse::off;
     std::string method = "cacao", device, settings;

@@ -56,6 +56,7 @@ void LargeFrames::find_surveys() {
             std::optional<CloudShape> shape = cloud_shape(entry.cloud, unused);
             if (!shape || !shape->whole_since.empty() || shape->records.grid.height > 1 || shape->records.viewpoint)
                 return;
+            settle_octree(shape->records, capture_.copc);
             CloudStream stream(entry.cloud, *std::move(shape));
             const std::optional<Eigen::AlignedBox3d> box = stream.box();
             if (!box)
@@ -130,6 +131,7 @@ LargeFrames::Part LargeFrames::part_of(std::size_t index, std::vector<std::strin
     std::ranges::move(about_file, std::back_inserter(warnings));
     notes.push_back(fmt::format("{} points, more than --cloud.memory holds: computed from disk, in tiles.",
                                 shape->records.point_count));
+    during(entry.cloud, [&] { settle_octree(shape->records, capture_.copc); });
     std::vector<CloudStream> files;
     files.emplace_back(entry.cloud, *std::move(shape));
     return {std::make_shared<LargeCloudRun>(std::move(files), settings(entry.name)), 0};
@@ -163,8 +165,6 @@ void compute_large(Work& work, PointMethod& method) {
         work.row.notes.push_back(fmt::format("coordinates are in {}.", unit));
     std::ranges::copy(found.notes, std::back_inserter(work.row.notes));
     std::ranges::copy(found.doubts, std::back_inserter(work.row.doubts));
-    if (!records.octree_damage.empty())
-        work.row.doubts.push_back(records.octree_damage);
 }
 
 void write_large(Work& work, const Outputs& outputs) {

@@ -20,6 +20,7 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
     Capture& capture = listing.capture;
     capture.path = path;
     capture.confidence_min = options.confidence_min;
+    capture.copc = options.copc;
     std::ranges::move(oddities_of_tar(path), std::back_inserter(capture.warnings));
     settle_names(capture.entries);
     const bool arbitrary = capture.depth.arbitrary;

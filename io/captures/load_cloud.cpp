@@ -71,8 +71,9 @@ void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame)
     frame.cloud = read_cloud(entry.cloud, frame.warnings);
     if (auto doubt = doubt_of_splats(*frame.cloud))
         frame.doubts.push_back(*std::move(doubt));
-    if (const std::string& damage = frame.cloud->records->octree_damage; !damage.empty())
-        frame.doubts.push_back(damage);
+    during(entry.cloud, [&] { // nobody else has these records yet
+        settle_octree(const_cast<CloudRecords&>(*frame.cloud->records), capture.copc);
+    });
     if (frame.cloud->records->viewpoint)
         frame.world_from_camera = frame.cloud->records->viewpoint;
     if (frame.cloud->organised()) {

@@ -64,7 +64,7 @@ struct CloudRecords {
     std::vector<Eigen::Vector3d> placed;                  ///< the points, if fields alone do not give them
     std::string unit;               ///< of the coordinates, and its source; empty: metres, by convention
     std::vector<laz::Chunk> octree; ///< COPC: the chunks as the file has them, its nodes; empty for other files
-    std::string octree_damage;      ///< COPC: a sentence on why the octree is not kept; empty where it is
+    std::string octree_damage;      ///< COPC: what is wrong with the octree; empty where it is kept
     double colour_step = 0;         ///< the divisor of colours, where these are a part of the file; 0 = they tell it
     std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera, if the file has one
     std::vector<Station> stations;              ///< of a file of several scans, in the order of their points
@@ -199,6 +199,9 @@ struct CloudShape {
 /// What comes before the points in a LAS file whose points ended at `old_end`.
 [[nodiscard]] std::string las_head(const CloudRecords& records, const std::vector<FieldAddition>& additions,
                                    std::uint64_t old_end);
+/// Throws Error where a COPC has a damaged octree. `copc` = false: it becomes LAZ, whatever its octree is.
+void settle_octree(CloudRecords& records, bool copc);
+
 /// What stands round the points of a LAZ file whose block of points ended at `old_end`. COPC keeps its octree: the
 /// chunks `octree` are packed anew, each with its points.
 struct LazHead {

@@ -407,13 +407,19 @@ void take_octree(CloudRecords& records, std::vector<laz::Chunk> chunks, std::uin
                      {records.after.substr(place.hierarchy, place.size), after_at + place.hierarchy}, chunks);
         records.octree = std::move(chunks);
     } catch (const Error& failure) {
-        records.octree_damage = fmt::format("the octree of this COPC is damaged: {}. The points are read as LAZ has "
-                                            "them, and written as plain LAZ.",
-                                            failure.what());
+        records.octree_damage = failure.what();
     }
 }
 
 } // namespace
+
+void settle_octree(CloudRecords& records, bool copc) {
+    if (copc && !records.octree_damage.empty())
+        throw Error("the octree of this COPC is damaged: " + records.octree_damage +
+                    "; --copc no reads the points as LAZ has them");
+    if (!copc)
+        records.octree.clear();
+}
 
 CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
     auto [records, compressed, points_at] = head_of(bytes, bytes.size(), file, warnings);

@@ -33,6 +33,7 @@ struct CaptureOptions {
     std::string topic = {};            ///< of depth images in a recording of ROS; empty = found by name and type
     double median_depth = usual_median_depth; ///< of a capture in an arbitrary unit: in the walk's lengths
     int confidence_min = 1; ///< depth whose confidence is lower is a hole: 0 low, 1 medium, 2 high, as phones give it
+    bool copc = true;       ///< false: COPC is read as LAZ is; else one whose octree is damaged is refused
 };
 
 /// One frame's listing: the paths of its parts. Nothing is decoded yet.
@@ -82,6 +83,7 @@ struct Capture {
     DepthEncoding depth;
     LengthUnit unit;         ///< arbitrary: depths and poses are no metres but parts of the scene, see settle_unit()
     int confidence_min = 1;  ///< CaptureOptions::confidence_min
+    bool copc = true;        ///< CaptureOptions::copc
     double median_depth = 0; ///< of such a capture, in the walk's lengths; 0 = no depth was readable
     DepthCorrection depth_correction;          ///< from the camera's file; load() applies it
     std::optional<ColourCamera> colour_camera; ///< the secondary camera, if one took the colour images and is known
