@@ -3,6 +3,7 @@
 
 #include "projection/base/error.h"
 #include "projection/base/parameters.h"
+#include "projection/base/splat.h"
 #include "projection/base/station.h"
 #include "projection/maps.h"
 #include "projection/sensor/noise.h"
@@ -136,6 +137,7 @@ struct PointSet {
     bool from_scanner = false; ///< whether all were surely seen from the scanner's position, as in a lidar's sweep
     std::span<const Eigen::Vector3d> seen_from = {}; ///< the camera of each, where cameras are known; else empty
     std::span<const Station> stations = {};          ///< as a file of several scans says; empty = it does not
+    std::span<const Splat> splats = {};              ///< what is about each point; empty = they are points of surfaces
 };
 
 /// Values of points, and what was chosen on the way.

@@ -4,6 +4,7 @@
 #include "ao/cloud/cloud_work.h"
 #include "ao/cloud/large_cloud.h"
 #include "ao/cloud/sides/recorded_stations.h"
+#include "ao/cloud/splat_ao.h"
 #include "ao/gpu/device.h"
 #include "ao/raycast/raycast.h"
 #include "projection/base/error.h"
@@ -30,6 +31,8 @@ PointVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vect
         options_.normals != CloudNormals::recorded)
         return of_scans(cloud, scanner);
     const CloudSetup setup{options_, device_, up_, viewpoint_};
+    if (!cloud.splats.empty())
+        return visibility_of_splats(setup, cloud, scanner);
     if (!options_.sky && cloud.points.size() > points_at_once(setup))
         return in_tiles(setup, cloud, scanner);
     CloudWork work = CloudWork::of_cloud(setup, cloud, scanner);

@@ -25,14 +25,17 @@ std::optional<std::string> doubted_noise(const FittedCounts& fitted) {
         100 * fitted.backs);
 }
 
+std::string turned_how(const SettledSides& sides) {
+    const bool to_place = sides.orientation.kind == NormalOrientation::Kind::viewpoint;
+    return (to_place ? "turned to " : "turned ") + sides.orientation.why;
+}
+
 std::string told_sides(const SettledSides& sides, bool recorded) {
-    const std::string facing = sides.orientation.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
     if (recorded && sides.turned_points > 0)
         return fmt::format("normals: recorded; {:.2g} % of them were turned, since {}{}.",
                            100.0 * static_cast<double>(sides.turned_points) / static_cast<double>(sides.judged_points),
-                           sides.turned_why, sides.repaired ? "" : "; " + facing + sides.orientation.why);
-    return recorded ? "normals: recorded."
-                    : "normals: from planes through 16 neighbours, " + facing + sides.orientation.why + ".";
+                           sides.turned_why, sides.repaired ? "" : "; " + turned_how(sides));
+    return recorded ? "normals: recorded." : "normals: from planes through 16 neighbours, " + turned_how(sides) + ".";
 }
 
 ToldError told_error(double error, double by_check) {

@@ -18,7 +18,9 @@ struct FittedCounts {
 
 /// About the points that a cloud's sides are of, in words: for notes. `recorded`: the normals were.
 [[nodiscard]] std::string told_sides(const SettledSides& sides, bool recorded);
-/// The same about noise; none where no point was moved.
+/// To which side sides were turned, and why.
+[[nodiscard]] std::string turned_how(const SettledSides& sides);
+/// As told_sides() about noise; none where no point was moved.
 [[nodiscard]] std::optional<std::string> told_noise(const FittedCounts& fitted);
 
 /// A doubt where noise was left in layers.

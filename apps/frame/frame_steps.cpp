@@ -2,6 +2,7 @@
 
 #include "apps/frame/point_clouds.h"
 #include "apps/frame/sequence_steps.h"
+#include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
 #include "projection/project.h"
@@ -96,6 +97,9 @@ void describe_frame(Work& work) {
 
 void choose_points_or_view(Work& work, CloudWalk walk) {
     work.by_points = work.frame.cloud && takes_points(work.frame, walk, work.row.notes);
+    if (work.frame.cloud && !work.by_points && !splats_of(*work.frame.cloud).empty())
+        work.row.doubts.emplace_back("one camera's view takes Gaussian splats for solid points at their centres; "
+                                     "--clouds points sees their shapes and opacities.");
 }
 
 void prepare_view(Work& work, const ProjectOptions& range) {

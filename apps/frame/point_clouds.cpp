@@ -5,6 +5,7 @@
 #include "io/clouds/cloud_edit.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
+#include "io/clouds/format.h"
 #include "projection/base/error.h"
 #include "projection/pixel_cloud.h"
 #include "projection/project.h"
@@ -41,7 +42,7 @@ bool is_one_view(const Frame& frame) {
     constexpr std::size_t fewest = 30000;
     constexpr double nearest_m = 0.1, farthest_m = 30;
     const std::vector<Vector3d>& points = frame.cloud->points;
-    if (frame.cloud->organised() || points.size() < fewest)
+    if (frame.cloud->organised() || points.size() < fewest || !splats_of(*frame.cloud).empty())
         return false;
     if (const double middle = middle_depth(*frame.cloud); middle < nearest_m || middle > farthest_m)
         return false;
@@ -67,11 +68,17 @@ PointVisibility visibility_of_points(const Frame& frame, PointMethod& method) {
     const auto triangles = triangles_of(cloud);
     // A sweep's pose is its scanner's. A viewpoint in a file is as often what the program writes that knows none.
     const bool from_scanner = frame.world_from_camera && !(cloud.records && cloud.records->viewpoint);
-    PointSet set{cloud.points, normals, triangles, z_is_up(cloud), from_scanner};
+    const std::span<const Splat> splats = splats_of(cloud);
+    const std::vector<Vector3d> with_haze = splats.empty() ? std::vector<Vector3d>() : points_with_haze(cloud);
+    PointSet set{splats.empty() ? cloud.points : with_haze, normals, triangles, z_is_up(cloud), from_scanner};
+    set.splats = splats;
     if (cloud.records)
         set.stations = cloud.records->stations;
     PointVisibility found = method.compute(set, scanner_of(frame));
-    if (normals.empty() && cloud.records && normal_fields(*cloud.records))
+    if (!splats.empty())
+        found.notes.insert(found.notes.begin(),
+                           fmt::format("{} Gaussian splats ({}).", splats.size(), cloud.records->format->name));
+    else if (normals.empty() && cloud.records && normal_fields(*cloud.records))
         found.notes.emplace_back("the file's normals are not used: fewer than nine in ten points have one.");
     if (const std::string unit = cloud.records ? unit_of(*cloud.records) : ""; !unit.empty())
         found.notes.insert(found.notes.begin(), fmt::format("coordinates are in {}.", unit));
@@ -86,7 +93,7 @@ Attached attached_points(const Cloud& cloud, std::vector<float> visibility) {
     for (std::size_t i = 0; i < cloud.points.size(); ++i) {
         const bool has_value = !std::isnan(attached.per_point[i]);
         valid += cloud.points[i].allFinite();
-        known += has_value;
+        known += has_value && cloud.points[i].allFinite();
         sum += has_value ? static_cast<double>(attached.per_point[i]) : 0;
     }
     attached.coverage = valid > 0 ? static_cast<double>(known) / static_cast<double>(valid) : 0;

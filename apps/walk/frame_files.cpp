@@ -53,6 +53,8 @@ void write_recorded_cloud(const std::filesystem::path& file, const Work& work, c
                           const Outputs& outputs) {
     const Cloud& cloud = *work.frame.cloud;
     const bool changed = outputs.colour_cloud != CloudColours::kept && takes_colours(cloud);
+    if (changed && !splats_of(cloud).empty())
+        return write_shaded_splats(file, cloud, all.visibility, outputs.shade_strength);
     std::vector<AddedField> fields{{"ambient_occlusion", all.visibility}};
     if (!all.confidence.empty())
         fields.push_back({"ao_confidence", all.confidence});
@@ -169,6 +171,10 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
                                     "ambient_occlusion has the values.");
     if (outputs.error && work.by_points && work.error.per_point.empty())
         work.row.warnings.push_back("the method estimates no errors of single points, so there is no field ao_error.");
+    if (work.frame.cloud && outputs.cloud && outputs.colour_cloud == CloudColours::kept &&
+        !splats_of(*work.frame.cloud).empty())
+        work.row.notes.push_back("ambient_occlusion comes behind the splats' own properties: what reads these by name "
+                                 "opens the file, INRIA's viewer does not; --colour-cloud shaded adds none.");
     if (work.frame.cloud && outputs.cloud)
         wrote(cloud_file(written_name(name, *work.frame.cloud->records), ""),
               [&](const auto& file) { write_recorded_cloud(file, work, points_of_cloud(work, outputs), outputs); });

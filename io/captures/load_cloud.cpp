@@ -3,7 +3,6 @@
 
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
-#include "io/clouds/splats.h"
 #include "projection/base/error.h"
 #include "projection/pixel_cloud.h"
 
@@ -69,8 +68,6 @@ bool is_image_in_millimetres(const Cloud& cloud, double middle) {
 
 void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame) {
     frame.cloud = read_cloud(entry.cloud, frame.warnings);
-    if (auto doubt = doubt_of_splats(*frame.cloud))
-        frame.doubts.push_back(*std::move(doubt));
     during(entry.cloud, [&] { // nobody else has these records yet
         settle_octree(const_cast<CloudRecords&>(*frame.cloud->records), capture.copc);
     });
@@ -79,7 +76,7 @@ void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame)
     if (frame.cloud->organised()) {
         if (const double middle = middle_depth(*frame.cloud); is_image_in_millimetres(*frame.cloud, middle))
             take_for_millimetres(frame, middle);
-    } else if (!capture.camera) {
+    } else if (!capture.camera && frame.cloud->records->splats.empty()) {
         see_pixels(frame);
     }
     if (!capture.camera)

@@ -15,9 +15,7 @@ namespace scanshade {
 /// Points without usable coordinates, or that their file does not want used.
 struct PointOddities {
     std::size_t all = 0, absurd = 0, unusable = 0;
-    std::size_t left_out = 0;    ///< LAS: withheld, or classified as noise; splats: of next to no opacity
-    bool splats = false;         ///< the points are Gaussian splats
-    std::size_t translucent = 0; ///< splats whose opacity is below a half, but for those left out
+    std::size_t left_out = 0; ///< LAS: withheld, or classified as noise
 };
 /// In the cloud's unit; NaN in all three coordinates where they are infinite, absurd (> 1e30) or unknown, where LAS
 /// marks the point as withheld or as noise, and where a splat has next to no opacity.

@@ -69,6 +69,19 @@ void place_coordinate(const CloudRecords& records, const char* name, int axis, s
                       [&](std::size_t i) { points[i][axis] = points[i][axis] * scale + shift; });
 }
 
+/// In the cloud's unit, whatever they are.
+std::vector<Eigen::Vector3d> recorded_points(const CloudRecords& records) {
+    if (!records.placed.empty())
+        return records.placed;
+    std::vector<Eigen::Vector3d> points(records.point_count);
+    place_coordinate(records, "x", 0, points);
+    place_coordinate(records, "y", 1, points);
+    place_coordinate(records, "z", 2, points);
+    return points;
+}
+
+bool is_usable(const Eigen::Vector3d& point) { return (point.array().abs() <= largest_coordinate).all(); }
+
 /// Of LAS and LAZ ("LAS Specification 1.4 - R15", tables 8, 9 and 17): withheld points "should not be included in
 /// processing", and classes 7 and 18 are noise, birds and clouds among it. Elsewhere no point is.
 class LeftOut {
@@ -101,35 +114,33 @@ class LeftOut {
 } // namespace
 
 std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, PointOddities& odd) {
-    std::vector<Eigen::Vector3d> points = records.placed;
-    if (points.empty()) {
-        points.resize(records.point_count);
-        place_coordinate(records, "x", 0, points);
-        place_coordinate(records, "y", 1, points);
-        place_coordinate(records, "z", 2, points);
-    }
+    std::vector<Eigen::Vector3d> points = recorded_points(records);
     const LeftOut is_left_out(records);
-    const std::optional<SplatFields> splats = splat_fields(records);
-    std::atomic<std::size_t> absurd = 0, unusable = 0, left_out = 0, translucent = 0; // hardly ever counted up
+    std::atomic<std::size_t> absurd = 0, unusable = 0, left_out = 0; // hardly ever counted up
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
         Eigen::Vector3d& point = points[i];
-        const double opacity = splats ? opacity_of(records, *splats, i) : 1;
-        const bool usable = (point.array().abs() <= largest_coordinate).all(),
-                   unwanted = is_left_out(i) || !(opacity >= least_opacity);
-        translucent += usable && !unwanted && opacity < solid_opacity;
-        if (usable && !unwanted)
+        const bool usable = is_usable(point), unwanted = is_left_out(i),
+                   haze = !records.splats.empty() && records.splats[i].opacity < least_opacity;
+        if (usable && !unwanted && !haze)
             return;
         ++unusable;
         absurd += !usable && !point.array().isNaN().any();
-        left_out += usable;
+        left_out += usable && unwanted;
         point.setConstant(std::numeric_limits<double>::quiet_NaN());
     });
     odd.all += points.size();
     odd.absurd += absurd;
     odd.unusable += unusable;
     odd.left_out += left_out;
-    odd.splats |= splats.has_value();
-    odd.translucent += translucent;
+    return points;
+}
+
+std::vector<Eigen::Vector3d> points_with_haze(const Cloud& cloud) {
+    std::vector<Eigen::Vector3d> points = recorded_points(*cloud.records);
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
+        if (!is_usable(points[i]))
+            points[i].setConstant(std::numeric_limits<double>::quiet_NaN());
+    });
     return points;
 }
 
@@ -137,15 +148,7 @@ void warn_of(const PointOddities& odd, const fs::path& file, std::vector<std::st
     if (odd.absurd > 0)
         warnings.push_back(fmt::format("{}: {} with infinite or absurd coordinates (beyond 1e30), treated as invalid.",
                                        file.string(), counted(odd.absurd, "point")));
-    if (odd.splats)
-        warnings.push_back(fmt::format("{}: {} Gaussian splats, taken for points at their centres; {} of them, of an "
-                                       "opacity below {:g}, are left out, without visibility{}.",
-                                       file.string(), odd.all, odd.left_out, least_opacity,
-                                       odd.translucent > 0 ? fmt::format("; {} of an opacity below {:g} occlude as "
-                                                                         "solid ones do",
-                                                                         odd.translucent, solid_opacity)
-                                                           : ""));
-    else if (odd.left_out > 0)
+    if (odd.left_out > 0)
         warnings.push_back(fmt::format("{}: {} marked as withheld or as noise: left out, without visibility.",
                                        file.string(), counted(odd.left_out, "point")));
     if (odd.all == 0)
@@ -353,6 +356,10 @@ Cloud read_cloud(const fs::path& file, std::vector<std::string>& warnings) {
     return cloud;
 }
 
+std::span<const Splat> splats_of(const Cloud& cloud) {
+    return cloud.records ? std::span(cloud.records->splats) : std::span<const Splat>();
+}
+
 std::vector<std::array<int, 3>> triangles_of(const Cloud& cloud) {
     const bool mesh = cloud.records && cloud.records->format->triangles;
     return mesh ? cloud.records->format->triangles(*cloud.records) : std::vector<std::array<int, 3>>();
@@ -429,6 +436,15 @@ void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<Add
     write_atomically(file, bytes);
 }
 
+void write_shaded_splats(const fs::path& file, const Cloud& cloud, std::span<const float> visibility, double strength) {
+    const CloudRecords& records = *cloud.records;
+    std::string bytes = during(file.string(), [&] {
+        const auto shaded = shaded_splats(records, splat_fields(records).value(), visibility, strength);
+        return records.format->written(records, edited_points(records, shaded, {}), {});
+    });
+    write_atomically(file, bytes);
+}
+
 void write_new_ply(const fs::path& file, const std::vector<Eigen::Vector3d>& points,
                    const std::vector<cv::Vec3b>& colours, const std::vector<AddedField>& added,
                    const std::vector<std::string>& comments) {
@@ -497,11 +513,12 @@ std::string describe(const CloudRecords& records) {
         names += " " + field.name;
     const std::string grid =
         records.grid.height > 1 ? fmt::format(", {}x{} organised", records.grid.width, records.grid.height) : "";
-    const char* const what = splat_fields(records) ? "Gaussian splat" : "point";
-    return fmt::format(
-        "{}{}{}, {}{}, fields{}{}", records.format->name, as_read ? " " + encoding_name(records) : "",
-        records.octree.empty() ? "" : fmt::format(", COPC of {}", counted(records.octree.size(), "node")),
-        counted(records.point_count, what), grid, names, records.unit.empty() ? "" : ", in " + records.unit);
+    const bool splats = !records.splats.empty() || splat_fields(records);
+    return fmt::format("{}{}{}, {}{}, fields{}{}", records.format->name, as_read ? " " + encoding_name(records) : "",
+                       records.octree.empty() ? ""
+                                              : fmt::format(", COPC of {}", counted(records.octree.size(), "node")),
+                       counted(records.point_count, splats ? "Gaussian splat" : "point"), grid, names,
+                       records.unit.empty() ? "" : ", in " + records.unit);
 }
 
 std::string unit_of(const CloudRecords& records) { return records.unit; }

@@ -2,6 +2,7 @@
 // bytes and written back.
 #pragma once
 
+#include "projection/base/splat.h"
 #include "projection/frame.h"
 
 #include <array>
@@ -41,6 +42,15 @@ struct AddedField {
 /// empty, replaces the colour field's r, g, b (alpha kept), or adds such fields where takes_colours(). Atomic.
 void write_cloud(const std::filesystem::path& file, const Cloud& cloud, const std::vector<AddedField>& added,
                  std::span<const cv::Vec3b> colours = {});
+
+/// The splats of a cloud, one per point, or none; opacity 0 where a splat shows nothing.
+[[nodiscard]] std::span<const Splat> splats_of(const Cloud& cloud);
+/// The points of splats, and those that `cloud.points` leaves out since they are of next to no opacity.
+[[nodiscard]] std::vector<Eigen::Vector3d> points_with_haze(const Cloud& cloud);
+/// Writes splats as they are but for their colours, all coefficients of them: srgb(linear(colour) (1 - strength +
+/// strength visibility)), as shade() does it. Where visibility is NaN, colours keep their bits. Atomic.
+void write_shaded_splats(const std::filesystem::path& file, const Cloud& cloud, std::span<const float> visibility,
+                         double strength);
 
 /// Whether the file has colours, or its format takes them behind the other fields; LAS does not.
 [[nodiscard]] bool takes_colours(const Cloud& cloud);

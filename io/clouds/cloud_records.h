@@ -2,6 +2,7 @@
 #pragma once
 
 #include "io/clouds/laz/laz.h"
+#include "projection/base/splat.h"
 #include "projection/base/station.h"
 
 #include <array>
@@ -68,6 +69,7 @@ struct CloudRecords {
     double colour_step = 0;         ///< the divisor of colours, where these are a part of the file; 0 = they tell it
     std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera, if the file has one
     std::vector<Station> stations;              ///< of a file of several scans, in the order of their points
+    std::vector<Splat> splats;                  ///< one per point; empty where points are no Gaussian splats
 
     [[nodiscard]] bool text() const { return encoding == Encoding::ascii; }
     /// Point `index`'s bytes; for text what lies between the last word before it and its own last word.

@@ -37,7 +37,7 @@ bool is_pcd(std::string_view start) {
 // Names come before PCD's signature: lists of points may begin with comments and names of columns, too.
 constexpr CloudFormat formats[] = {
     {.name = "PLY",
-     .content = "ascii, both byte orders; meshes, too; Gaussian splats as points",
+     .content = "ascii, both byte orders; meshes, too; Gaussian splats",
      .signature = &is_ply,
      .extensions = {".ply"},
      .read = &read_ply,

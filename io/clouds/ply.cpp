@@ -1,6 +1,7 @@
 // PLY 1.0 (Turk 1994): header checked line by line, the vertices walked, everything else kept as the file's own bytes.
 #include "io/clouds/cloud_records.h"
 
+#include "io/clouds/splats.h"
 #include "io/file_bytes.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -421,6 +422,7 @@ CloudRecords read_ply(std::string_view bytes, const fs::path& file, std::vector<
         }
     }
     records.after = walk.body().substr(vertices_end);
+    records.splats = during(file.string(), [&] { return splats_of(records); });
     const std::size_t left = walk.body().size() - walk.at();
     if (records.text() ? walk.more_text() : left > 0)
         warnings.push_back(fmt::format("{}: {} after the last element; written back as they are.", file.string(),
@@ -444,8 +446,11 @@ CloudShape ply_shape(const FileBytes& file, std::vector<std::string>& warnings) 
         field.offset = records.stride;
         records.stride += field.bytes();
     }
-    if (records.text() || vertex.lists()) {
-        shape.whole_since = records.text() ? "it is text" : "its points hold lists";
+    const bool splats = during(path.string(), [&] { return splat_fields(records).has_value(); });
+    if (records.text() || vertex.lists() || splats) {
+        shape.whole_since = splats           ? "its points are Gaussian splats"
+                            : records.text() ? "it is text"
+                                             : "its points hold lists";
         return shape;
     }
     constexpr std::uint64_t most_before = 16 << 20;

@@ -63,13 +63,14 @@ void DiscRays::open(std::size_t leaf, const DirectionSet& directions, float radi
         DiscRay& ray = rays[i - begin];
         const Eigen::Matrix3f axes = axes_about(surface_.normals[i]);
         const DirectionSet::Run run = directions.run(i);
-        int free = 0;
+        float free = 0;
         for (int k = 0; k < run.count; ++k) {
             ray.direction = axes * Vector3f(run.x[k], run.y[k], run.z[k]);
             const bool below = up && ray.direction.dot(*up) <= 0;
-            free += !below && !discs_.blocked(start, ray);
+            if (!below)
+                free += discs_.is_soft() ? discs_.transmitted(start, ray) : discs_.blocked(start, ray) ? 0.0F : 1.0F;
         }
-        values[i] = static_cast<float>(free) / static_cast<float>(run.count);
+        values[i] = free / static_cast<float>(run.count);
     }
 }
 
@@ -106,7 +107,10 @@ int DiscRays::seen_from(std::size_t index, const Vector3f& position) const {
     ray.direction = position - from;
     ray.near = clear_of_ends;
     ray.far = 1 - clear_of_ends;
-    return discs_.blocked(discs_.start_at_root(), ray) ? 0 : side;
+    constexpr float half = 0.5F;
+    const DiscTree::Start start = discs_.start_at_root();
+    const bool hidden = discs_.is_soft() ? discs_.transmitted(start, ray) < half : discs_.blocked(start, ray);
+    return hidden ? 0 : side;
 }
 
 } // namespace scanshade

@@ -15,11 +15,12 @@ namespace scanshade {
 /// several threads.
 class DiscRays {
   public:
-    explicit DiscRays(const CloudSurface& surface) : surface_(surface), discs_(surface) {}
+    explicit DiscRays(const CloudSurface& surface, std::span<const SoftDisc> soft = {})
+        : surface_(surface), discs_(surface, soft) {}
 
     /// For points of one leaf of the surface's tree: the share of the rays of a point's own run that hit nothing within
-    /// `radius`. With `up`, rays below that horizon count as blocked. Only for points that have a normal and a 1 in
-    /// `asked`; the other values stay.
+    /// `radius`; of soft discs, the mean share of light. With `up`, rays below that horizon count as blocked. Only for
+    /// points that have a normal and a 1 in `asked`; the other values stay.
     void open(std::size_t leaf, const DirectionSet& directions, float radius, const std::optional<Eigen::Vector3f>& up,
               std::span<const char> asked, std::span<float> values) const;
 
@@ -33,8 +34,9 @@ class DiscRays {
     };
     /// A run of eight rays on one side of a point's plane.
     [[nodiscard]] Hits first_hits(std::size_t index, const Eigen::Vector3f& side, const DirectionSet::Run& run) const;
-    /// Whether nothing stands between a point and a position, which is relative to the surface's middle. 1: it is seen
-    /// from the side of its normal. -1: from behind. 0: it is hidden, or seen at less than 6 degrees.
+    /// Whether nothing, or soft discs that let half of the light through, stand between a point and a position, which
+    /// is relative to the surface's middle. 1: it is seen from the side of its normal. -1: from behind. 0: it is
+    /// hidden, or seen at less than 6 degrees.
     [[nodiscard]] int seen_from(std::size_t index, const Eigen::Vector3f& position) const;
 
   private:

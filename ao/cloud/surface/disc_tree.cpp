@@ -127,7 +127,10 @@ struct Traversal {
     };
     static constexpr std::size_t deepest = DiscTree::Start::most + 8 * 12; ///< eight for each level below
 
-    [[gnu::always_inline]] bool blocked(const DiscTree::Start& start) const {
+    /// Visits the discs that the ray hits, in any order, until `visit(index, distance)` returns true. Returns whether
+    /// it did.
+    template <class Visit>
+    [[gnu::always_inline]] bool visit_hits(const DiscTree::Start& start, Visit&& visit) const {
         std::array<Waiting, deepest> stack;
         std::size_t depth = 0;
         std::array<float, 8> entry;
@@ -143,11 +146,29 @@ struct Traversal {
                 const std::uint32_t child = 8 * number + static_cast<std::uint32_t>(std::countr_zero(mask));
                 if (level < last)
                     stack[depth++] = {level + 1, child, 0};
-                else if (visit_leaf(child, [](std::uint32_t, float) { return true; }))
+                else if (visit_leaf(child, visit))
                     return true;
             }
         }
         return false;
+    }
+
+    [[gnu::always_inline]] bool blocked(const DiscTree::Start& start) const {
+        return visit_hits(start, [](std::uint32_t, float) { return true; });
+    }
+
+    [[gnu::always_inline]] float transmitted(const DiscTree::Start& start) const {
+        constexpr float dark = 1.0F / 512; // half a step of a byte
+        float left = 1;
+        visit_hits(start, [&](std::uint32_t index, float distance) {
+            const SoftDisc& disc = tree.soft_[index];
+            const Vector3f centre(tree.coordinate(0)[index], tree.coordinate(1)[index], tree.coordinate(2)[index]);
+            const Vector3f offset = (ray.origin - centre) + distance * ray.direction;
+            const float along_u = disc.u.dot(offset), along_v = disc.v.dot(offset);
+            left *= 1 - disc.opacity * std::exp(-(along_u * along_u + along_v * along_v) / 2);
+            return left < dark;
+        });
+        return left < dark ? 0 : left;
     }
 
     /// Opens what is entered first, first.
@@ -191,11 +212,15 @@ namespace {
 /// The same for vectors of four and of eight.
 struct Compiled {
     bool (*blocked)(const DiscTree&, const DiscTree::Start&, const DiscRay&);
+    float (*transmitted)(const DiscTree&, const DiscTree::Start&, const DiscRay&);
     std::optional<DiscTree::Hit> (*first)(const DiscTree&, const DiscRay&);
 };
 
 bool blocked_any(const DiscTree& tree, const DiscTree::Start& start, const DiscRay& ray) {
     return Traversal(tree, ray).blocked(start);
+}
+float transmitted_any(const DiscTree& tree, const DiscTree::Start& start, const DiscRay& ray) {
+    return Traversal(tree, ray).transmitted(start);
 }
 std::optional<DiscTree::Hit> first_any(const DiscTree& tree, const DiscRay& ray) {
     return Traversal(tree, ray).first();
@@ -203,6 +228,9 @@ std::optional<DiscTree::Hit> first_any(const DiscTree& tree, const DiscRay& ray)
 #if defined(__x86_64__)
 [[gnu::target("avx2")]] bool blocked_avx2(const DiscTree& tree, const DiscTree::Start& start, const DiscRay& ray) {
     return Traversal(tree, ray).blocked(start);
+}
+[[gnu::target("avx2")]] float transmitted_avx2(const DiscTree& tree, const DiscTree::Start& start, const DiscRay& ray) {
+    return Traversal(tree, ray).transmitted(start);
 }
 [[gnu::target("avx2")]] std::optional<DiscTree::Hit> first_avx2(const DiscTree& tree, const DiscRay& ray) {
     return Traversal(tree, ray).first();
@@ -212,9 +240,9 @@ std::optional<DiscTree::Hit> first_any(const DiscTree& tree, const DiscRay& ray)
 Compiled fastest_compiled() {
 #if defined(__x86_64__)
     if (__builtin_cpu_supports("avx2"))
-        return {blocked_avx2, first_avx2};
+        return {blocked_avx2, transmitted_avx2, first_avx2};
 #endif
-    return {blocked_any, first_any};
+    return {blocked_any, transmitted_any, first_any};
 }
 const Compiled compiled = fastest_compiled();
 
@@ -227,7 +255,8 @@ const DiscTree::Node DiscTree::nobody = [] {
     return node;
 }();
 
-DiscTree::DiscTree(const CloudSurface& surface) : stride_(surface.size() + wide) {
+DiscTree::DiscTree(const CloudSurface& surface, std::span<const SoftDisc> soft)
+    : stride_(surface.size() + wide), soft_(soft) {
     copy_discs(surface);
     join_boxes(surface.tree);
 }
@@ -235,7 +264,9 @@ DiscTree::DiscTree(const CloudSurface& surface) : stride_(surface.size() + wide)
 void DiscTree::copy_discs(const CloudSurface& surface) {
     using Box = Eigen::AlignedBox3f;
     const NeighbourTree& tree = surface.tree;
-    const auto radius_of = [&](std::size_t i) { return surface.normals[i].isZero() ? 0 : surface.disc_radius[i]; };
+    const auto radius_of = [&](std::size_t i) {
+        return surface.normals[i].isZero() ? 0 : is_soft() ? soft_[i].radius : surface.disc_radius[i];
+    };
     const Box all = tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, tree.size()), Box(),
         [&](const auto& range, Box box) {
@@ -362,6 +393,10 @@ DiscTree::Start DiscTree::start_near(const Origins& origins, float reach) const 
 }
 
 bool DiscTree::blocked(const Start& start, const DiscRay& ray) const { return compiled.blocked(*this, start, ray); }
+
+float DiscTree::transmitted(const Start& start, const DiscRay& ray) const {
+    return compiled.transmitted(*this, start, ray);
+}
 
 std::optional<DiscTree::Hit> DiscTree::first_hit(const DiscRay& ray) const { return compiled.first(*this, ray); }
 

@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace scanshade {
@@ -22,12 +23,20 @@ struct DiscRay {
     float own_reach = 0, own_depth = 0;
 };
 
+/// A Gaussian within the plane of a disc. At the offset x from the middle it takes the share
+/// opacity e^(-((u x)^2 + (v x)^2) / 2) of the light, up to the disc's rim.
+struct SoftDisc {
+    Eigen::Vector3f u = Eigen::Vector3f::Zero(), v = u; ///< in the plane, 1 / length
+    float opacity = 0, radius = 0;                      ///< radius 0: takes nothing
+};
+
 /// Immutable once made; safe to use from several threads. Takes 32 bytes a point. Eight boxes or discs are tested
 /// together, without fused multiplications: all processors find the same hits.
 class DiscTree {
   public:
-    /// The discs of points that have a normal and a radius. The surface is not needed afterwards.
-    explicit DiscTree(const CloudSurface& surface);
+    /// The discs of points that have a normal and a radius. The surface is not needed afterwards. `soft`, if not empty,
+    /// has the radii instead, one for each point by index in the surface's tree; it must outlive this.
+    explicit DiscTree(const CloudSurface& surface, std::span<const SoftDisc> soft = {});
 
     /// A position relative to the surface's middle becomes one relative to the middle of the discs.
     [[nodiscard]] Eigen::Vector3f local(const Eigen::Vector3d& position) const {
@@ -60,6 +69,9 @@ class DiscTree {
 
     /// Whether any disc blocks the ray.
     [[nodiscard]] bool blocked(const Start& start, const DiscRay& ray) const;
+    /// The share of the light that all soft discs on the ray's way let through.
+    [[nodiscard]] float transmitted(const Start& start, const DiscRay& ray) const;
+    [[nodiscard]] bool is_soft() const { return !soft_.empty(); }
 
     struct Hit {
         float distance; ///< in lengths of the direction
@@ -82,6 +94,7 @@ class DiscTree {
     Eigen::Vector3d middle_ = Eigen::Vector3d::Zero();
     double rounding_ = 0;
     std::size_t stride_ = 0;
+    std::span<const SoftDisc> soft_;
     std::unique_ptr<float[]> discs_;  ///< x y z, normal x y z, radius: `stride_` of each, by index
     Untouched<std::uint32_t> begins_; ///< the first disc of each leaf
     Untouched<Node> nodes_;           ///< level after level; node n of a level has the children 8n .. 8n + 7
