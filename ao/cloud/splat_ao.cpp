@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Vector3d, Eigen::Vector3f;
 
-constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+constexpr float unseen = std::numeric_limits<float>::quiet_NaN();
 
 /// The numbers of the axes by their sigmas.
 struct Axes {
@@ -104,11 +104,11 @@ Members members_of(const PointSet& cloud, const Indices& which, bool use_axes) {
     return members;
 }
 
-Untouched<float> rays_and_means(const CloudSurface& surface, const DiscRays& rays, const DirectionSet& directions,
-                                int passes, float radius, const std::optional<Vector3f>& up) {
+Untouched<float> light_on(const CloudSurface& surface, const DiscRays& rays, const DirectionSet& directions, int passes,
+                          float radius, const std::optional<Vector3f>& up) {
     const std::vector<char> all(surface.size(), 1);
     Untouched<float> values(surface.size());
-    std::ranges::fill(values, nothing);
+    std::ranges::fill(values, unseen);
     tbb::parallel_for(std::size_t(0), surface.tree.leaves(),
                       [&](std::size_t leaf) { rays.open(leaf, directions, radius, up, all, values); });
     for (int pass = 0; pass < passes; ++pass)
@@ -170,8 +170,8 @@ class SplatWork {
           scanner_(scanner) {}
     PointVisibility run() {
         const std::size_t count = cloud_.points.size();
-        result_.visibility.assign(count, nothing);
-        result_.error.assign(count, nothing);
+        result_.visibility.assign(count, unseen);
+        result_.error.assign(count, unseen);
         result_.normals.assign(count, Vector3f::Zero());
         const Chosen chosen = chosen_of(cloud_);
         if (!chosen.surface.empty())
@@ -236,7 +236,7 @@ void SplatWork::of_surface(const Indices& which) {
     const float reach = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
     const auto up = options_.sky ? std::optional<Vector3f>(setup_.up.cast<float>()) : std::nullopt;
     const Untouched<float> values =
-        rays_and_means(surface, rays, DirectionSet(options_.rays, options_.seed), options_.smooth, reach, up);
+        light_on(surface, rays, DirectionSet(options_.rays, options_.seed), options_.smooth, reach, up);
     watch.lap("rays and means");
     attach(surface, values, side_known, which);
     give_to_haze(surface, which);
