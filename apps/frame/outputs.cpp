@@ -24,6 +24,7 @@ fs::path light_file(const char* kind, const std::string& name, const Outputs& ou
 fs::path cloud_file(const std::string& name, const std::string& extension) {
     return fs::path("clouds") / (name + extension);
 }
+fs::path fields_file(const std::string& name) { return cloud_file(name, ".ao.ply"); }
 fs::path preview_file(const std::string& name) { return fs::path("previews") / (name + ".js"); }
 fs::path points_file(const std::string& name, std::size_t part) {
     return fs::path("points") / fmt::format("{}.{:03}.js", name, part);
@@ -67,6 +68,8 @@ std::vector<fs::path> files_of(const CaptureEntry& entry, const Outputs& outputs
     if (!entry.cloud.empty() && of_points(outputs).cloud)
         for (const std::string_view extension : written_cloud_extensions())
             add(cloud_file(entry.name, std::string(extension)));
+    if (!entry.cloud.empty() && of_points(outputs).cloud)
+        add(fields_file(entry.name));
     if (const std::string plain = plain_laz_name(entry.name); !entry.cloud.empty() && plain != entry.name)
         add(cloud_file(plain, ".laz"));
     return files;

@@ -66,6 +66,8 @@ struct Outputs {
 /// Of "unshaded", "ambient", "direct" or "indirect".
 [[nodiscard]] std::filesystem::path light_file(const char* kind, const std::string& name, const Outputs& outputs);
 [[nodiscard]] std::filesystem::path cloud_file(const std::string& name, const std::string& extension);
+/// Of a cloud whose format has no room for fields, beside cloud_file().
+[[nodiscard]] std::filesystem::path fields_file(const std::string& name);
 [[nodiscard]] std::filesystem::path preview_file(const std::string& name);
 [[nodiscard]] std::filesystem::path points_file(const std::string& name, std::size_t part);
 

@@ -17,6 +17,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <functional>
 #include <span>
 
 namespace scanshade {
@@ -49,18 +50,33 @@ void write_depth_cloud(const std::filesystem::path& file, const Work& work, cons
                                unit.arbitrary() ? "in the recording's arbitrary unit" : "metres")});
 }
 
-void write_recorded_cloud(const std::filesystem::path& file, const Work& work, const FramePoints& all,
-                          const Outputs& outputs) {
+using Writer = std::function<void(const std::filesystem::path&)>;
+
+/// The cloud's files by their names. A format without room for fields gets a list of values, and the cloud itself where
+/// its colours change.
+std::vector<std::pair<std::filesystem::path, Writer>> recorded_cloud_files(const Work& work, const FramePoints& all,
+                                                                           const Outputs& outputs) {
     const Cloud& cloud = *work.frame.cloud;
-    const bool changed = outputs.colour_cloud != CloudColours::kept && takes_colours(cloud);
-    if (changed && !splats_of(cloud).empty())
-        return write_shaded_splats(file, cloud, all.visibility, outputs.shade_strength);
     std::vector<AddedField> fields{{"ambient_occlusion", all.visibility}};
     if (!all.confidence.empty())
         fields.push_back({"ao_confidence", all.confidence});
     if (!all.error.empty())
         fields.push_back({"ao_error", all.error});
-    write_cloud(file, cloud, fields, changed ? std::span(all.colours) : std::span<const cv::Vec3b>());
+    const bool changed = outputs.colour_cloud != CloudColours::kept && takes_colours(cloud);
+    const std::filesystem::path same = cloud_file(written_name(work.entry.name, *cloud.records), "");
+    std::vector<std::pair<std::filesystem::path, Writer>> files;
+    if (!takes_fields(cloud))
+        files.emplace_back(fields_file(work.entry.name),
+                           [=, &cloud](const auto& file) { write_new_ply(file, points_with_haze(cloud), {}, fields); });
+    if (changed && !splats_of(cloud).empty())
+        files.emplace_back(same, [&cloud, &all, &outputs](const auto& file) {
+            write_shaded_splats(file, cloud, all.visibility, outputs.shade_strength);
+        });
+    else if (takes_fields(cloud))
+        files.emplace_back(same, [=, &cloud, &all](const auto& file) {
+            write_cloud(file, cloud, fields, changed ? std::span(all.colours) : std::span<const cv::Vec3b>());
+        });
+    return files;
 }
 
 /// The points or the mesh as glTF, which has colours: visibility as grey where the frame has none.
@@ -172,12 +188,14 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
     if (outputs.error && work.by_points && work.error.per_point.empty())
         work.row.warnings.push_back("the method estimates no errors of single points, so there is no field ao_error.");
     if (work.frame.cloud && outputs.cloud && outputs.colour_cloud == CloudColours::kept &&
-        !splats_of(*work.frame.cloud).empty())
+        !splats_of(*work.frame.cloud).empty() && takes_fields(*work.frame.cloud))
         work.row.notes.push_back("ambient_occlusion comes behind the splats' own properties: what reads these by name "
                                  "opens the file, INRIA's viewer does not; --colour-cloud shaded adds none.");
-    if (work.frame.cloud && outputs.cloud)
-        wrote(cloud_file(written_name(name, *work.frame.cloud->records), ""),
-              [&](const auto& file) { write_recorded_cloud(file, work, points_of_cloud(work, outputs), outputs); });
+    if (work.frame.cloud && outputs.cloud) {
+        const FramePoints points = points_of_cloud(work, outputs);
+        for (const auto& [file, write] : recorded_cloud_files(work, points, outputs))
+            wrote(file, write);
+    }
     if (!work.frame.cloud && outputs.depth_cloud)
         wrote(cloud_file(name, ".ply"), [&](const auto& file) {
             write_depth_cloud(file, work, points_of_depth(work, scene, outputs), outputs.unit);

@@ -21,7 +21,7 @@ namespace {
 
 constexpr const char* meshes = "meshes are read from PLY, which Blender, MeshLab and CloudCompare write";
 constexpr const char* splats =
-    "Gaussian splats are read from PLY that is not compressed: `splat-transform IN OUT.ply` makes one";
+    "Gaussian splats are read from PLY, .splat and .spz: `splat-transform IN OUT.ply` makes one";
 constexpr const char* videos =
     "videos hold no distances; of recordings with depth, .mkv of Azure Kinect, .bag, .mcap and .r3d are read";
 
@@ -44,8 +44,6 @@ constexpr std::array foreign{
     Foreign{".usda", "#usda", "a scene in USD", meshes},
     Foreign{".vtk", "# vtk", "a data set of VTK", meshes},
     Foreign{".vtp", "", "a data set of VTK", meshes},
-    Foreign{".spz", "", "Gaussian splats in SPZ", splats},
-    Foreign{".splat", "", "Gaussian splats in .splat", splats},
     Foreign{".ksplat", "", "Gaussian splats in .ksplat", splats},
     Foreign{".sog", "", "Gaussian splats in SOG", splats},
     Foreign{".svo", "", "a recording of a ZED camera",

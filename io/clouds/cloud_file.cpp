@@ -439,6 +439,8 @@ void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<Add
 void write_shaded_splats(const fs::path& file, const Cloud& cloud, std::span<const float> visibility, double strength) {
     const CloudRecords& records = *cloud.records;
     std::string bytes = during(file.string(), [&] {
+        if (records.format->shaded)
+            return records.format->shaded(records, visibility, strength);
         const auto shaded = shaded_splats(records, splat_fields(records).value(), visibility, strength);
         return records.format->written(records, edited_points(records, shaded, {}), {});
     });
@@ -524,9 +526,11 @@ std::string describe(const CloudRecords& records) {
 std::string unit_of(const CloudRecords& records) { return records.unit; }
 
 bool takes_colours(const Cloud& cloud) {
-    return cloud.records &&
-           (cloud.records->format->new_colours != NewColours::none || has_colour_fields(*cloud.records));
+    return cloud.records && (cloud.records->format->new_colours != NewColours::none ||
+                             has_colour_fields(*cloud.records) || !cloud.records->splats.empty());
 }
+
+bool takes_fields(const Cloud& cloud) { return !cloud.records || cloud.records->format->written; }
 
 void MapCounts::add(const Eigen::Vector3d& point) {
     constexpr double from = 1e5; // eastings and northings have six digits or more

@@ -55,6 +55,9 @@ void write_shaded_splats(const std::filesystem::path& file, const Cloud& cloud, 
 /// Whether the file has colours, or its format takes them behind the other fields; LAS does not.
 [[nodiscard]] bool takes_colours(const Cloud& cloud);
 
+/// Whether its format has room for fields; packed splats have none.
+[[nodiscard]] bool takes_fields(const Cloud& cloud);
+
 /// A new cloud as binary PLY (x y z float or double when far from the origin, red green blue, `added`). Atomic.
 void write_new_ply(const std::filesystem::path& file, const std::vector<Eigen::Vector3d>& points,
                    const std::vector<cv::Vec3b>& colours, const std::vector<AddedField>& added,

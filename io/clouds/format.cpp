@@ -1,6 +1,7 @@
 // The table of cloud formats, and the questions that it answers.
 #include "io/clouds/format.h"
 
+#include "io/clouds/packed_splats.h"
 #include "io/images/format.h"
 #include "io/text.h"
 
@@ -16,6 +17,11 @@ namespace fs = std::filesystem;
 bool is_ply(std::string_view start) {
     return start.starts_with("ply") && trimmed(start.substr(0, start.find_first_of("\r\n"))) == "ply" &&
            start.find_first_of("\r\n") != std::string_view::npos;
+}
+/// PLY whose positions are packed as PlayCanvas does it.
+bool is_packed_ply(std::string_view start) {
+    return is_ply(start) &&
+           start.substr(0, start.find("end_header")).find(" packed_position") != std::string_view::npos;
 }
 bool is_las(std::string_view start) { return start.starts_with("LASF"); }
 /// A LAS file whose point format has the bit of compression.
@@ -36,6 +42,12 @@ bool is_pcd(std::string_view start) {
 
 // Names come before PCD's signature: lists of points may begin with comments and names of columns, too.
 constexpr CloudFormat formats[] = {
+    {.name = "packed PLY",
+     .content = "Gaussian splats of PlayCanvas and SuperSplat; values go to `NAME.ao.ply`",
+     .signature = &is_packed_ply,
+     .extensions = {".ply"},
+     .read = &read_compressed_ply,
+     .shaded = &shaded_compressed_ply},
     {.name = "PLY",
      .content = "ascii, both byte orders; meshes, too; Gaussian splats",
      .signature = &is_ply,
@@ -104,6 +116,17 @@ constexpr CloudFormat formats[] = {
      .binary_encoding = "binary_little_endian",
      .new_colours = NewColours::bytes,
      .z_up = true},
+    {.name = "SPZ",
+     .content = "Gaussian splats, versions 2-4; values go to `NAME.ao.ply`",
+     .signature = &is_spz,
+     .extensions = {".spz"},
+     .read = &read_spz,
+     .shaded = &shaded_spz},
+    {.name = "splat",
+     .content = "Gaussian splats of 32 bytes; values go to `NAME.ao.ply`",
+     .extensions = {".splat"},
+     .read = &read_splat,
+     .shaded = &shaded_splat},
     {.name = "PCD",
      .content = "ascii, binary, compressed",
      .signature = &is_pcd,
@@ -166,7 +189,8 @@ std::string plain_laz_name(const std::string& name) {
 std::vector<std::string_view> written_cloud_extensions() {
     std::vector<std::string_view> extensions;
     for (const CloudFormat& format : formats)
-        if (format.written && std::ranges::find(extensions, written_extension(format)) == extensions.end())
+        if ((format.written || format.shaded) &&
+            std::ranges::find(extensions, written_extension(format)) == extensions.end())
             extensions.push_back(written_extension(format));
     return extensions;
 }

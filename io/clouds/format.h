@@ -29,6 +29,8 @@ struct CloudFormat {
     /// The file again with `points` (from edited_points) and a header that names `additions`.
     std::string (*written)(const CloudRecords& records, std::string points,
                            const std::vector<FieldAddition>& additions) = nullptr;
+    /// Of splats that are no PLY: the file again with shaded colours. Where `written` is missing, it takes no fields.
+    std::string (*shaded)(const CloudRecords& records, std::span<const float> visibility, double strength) = nullptr;
     CloudShape (*shape)(const FileBytes& file, std::vector<std::string>& warnings) = nullptr; ///< none: read as a whole
     std::vector<std::array<int, 3>> (*triangles)(const CloudRecords& records) = nullptr;      ///< none: no meshes
     std::string_view binary_encoding = "binary"; ///< what the format calls little-endian numbers

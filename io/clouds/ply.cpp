@@ -1,6 +1,7 @@
 // PLY 1.0 (Turk 1994): header checked line by line, the vertices walked, everything else kept as the file's own bytes.
 #include "io/clouds/cloud_records.h"
 
+#include "io/clouds/packed_splats.h"
 #include "io/clouds/splats.h"
 #include "io/file_bytes.h"
 #include "io/text.h"
@@ -359,8 +360,6 @@ void pass_over(BodyWalk& walk, const Element& element, const PlyHeader& header, 
     }
 }
 
-bool is_packed_splat(const CloudField& property) { return property.name == "packed_position"; }
-
 const Element& vertex_element(const PlyHeader& header, const fs::path& file) {
     const Element* vertex = nullptr;
     for (const Element& element : header.elements) {
@@ -375,10 +374,6 @@ const Element& vertex_element(const PlyHeader& header, const fs::path& file) {
     for (const auto* name : {"x", "y", "z"}) {
         const bool there = std::any_of(vertex->properties.begin(), vertex->properties.end(),
                                        [&](const CloudField& p) { return is_named(p, name) && !p.list_length; });
-        if (!there && std::ranges::any_of(vertex->properties, is_packed_splat))
-            throw Error(fmt::format("{}: Gaussian splats, packed as PlayCanvas and SuperSplat do (packed_position); "
-                                    "expected plain ones: export them as PLY that is not compressed",
-                                    at_line(file, vertex->line)));
         if (!there)
             throw Error(fmt::format("{}: element vertex has no property {}", at_line(file, vertex->line), name));
     }
@@ -428,6 +423,33 @@ CloudRecords read_ply(std::string_view bytes, const fs::path& file, std::vector<
         warnings.push_back(fmt::format("{}: {} after the last element; written back as they are.", file.string(),
                                        counted(left, "byte")));
     return records;
+}
+
+std::size_t PlyTable::offset_of(const std::string& field, Scalar type) const {
+    const auto found = std::ranges::find(fields, field, &CloudField::name);
+    if (found == fields.end() || found->type != type)
+        throw Error(fmt::format("element {} has no property {} of {} bytes as expected", name, field, size_of(type)));
+    return found->offset;
+}
+
+std::vector<PlyTable> ply_tables(std::string_view bytes, const fs::path& file) {
+    const PlyHeader header = parse_header(bytes, file);
+    if (header.encoding != Encoding::binary)
+        throw Error(file.string() + ": packed splats are read from binary_little_endian");
+    BodyWalk walk(bytes.substr(header.length), header, file);
+    std::vector<PlyTable> tables;
+    for (const Element& element : header.elements) {
+        if (element.lists())
+            throw Error(fmt::format("{}: element {} has lists", at_line(file, element.line), element.name));
+        PlyTable& table = tables.emplace_back(
+            PlyTable{element.name, element.properties, element.count, 0, header.length + walk.at()});
+        for (CloudField& field : table.fields) {
+            field.offset = table.stride;
+            table.stride += field.bytes();
+        }
+        walk.skip_fixed(element);
+    }
+    return tables;
 }
 
 CloudShape ply_shape(const FileBytes& file, std::vector<std::string>& warnings) {

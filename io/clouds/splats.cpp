@@ -37,11 +37,6 @@ std::vector<std::size_t> rest_fields(const CloudRecords& records) {
     return found;
 }
 
-/// V' of 1 - s + s V; 1 where nothing is known.
-double light_of(float visibility, double strength) {
-    return std::isnan(visibility) ? 1 : 1 - strength + strength * static_cast<double>(visibility);
-}
-
 } // namespace
 
 std::optional<SplatFields> splat_fields(const CloudRecords& records) {
@@ -96,6 +91,10 @@ std::vector<cv::Vec3b> colours_of(const CloudRecords& records, const SplatFields
         }
     });
     return colours;
+}
+
+double light_of(float visibility, double strength) {
+    return std::isnan(visibility) ? 1 : 1 - strength + strength * static_cast<double>(visibility);
 }
 
 double shaded_channel(double colour, double light) {

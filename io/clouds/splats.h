@@ -41,6 +41,8 @@ struct SplatFields {
 /// BGR: the part of the colour that is the same from all sides.
 [[nodiscard]] std::vector<cv::Vec3b> colours_of(const CloudRecords& records, const SplatFields& fields);
 
+/// What visibility leaves of the light: 1 - strength + strength visibility; 1 where that is NaN.
+[[nodiscard]] double light_of(float visibility, double strength);
 /// A colour of splats, as it is displayed and may exceed 1, times light: srgb(linear(colour) light). In linear light,
 /// as shade() of projection/attach.h does it.
 [[nodiscard]] double shaded_channel(double colour, double light);

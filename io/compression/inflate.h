@@ -1,4 +1,4 @@
-// Unpacks deflate, as zlib streams and as bare ones.
+// Unpacks deflate, as zlib streams, as gzip and as bare ones.
 #pragma once
 
 #include <cstddef>
@@ -7,10 +7,12 @@
 
 namespace scanshade {
 
-enum class Inflate { zlib, raw };
+enum class Inflate { zlib, raw, gzip };
 
 /// All bytes of one stream, of which there may be at most `most`. Throws Error for damage, for bytes after the
 /// stream's end, and for more than that; the message names no file.
 [[nodiscard]] std::string inflated(std::string_view packed, Inflate form, std::size_t most);
+/// The first bytes of one stream, `count` or all. Throws Error where they are damaged or not there.
+[[nodiscard]] std::string inflated_start(std::string_view packed, Inflate form, std::size_t count);
 
 } // namespace scanshade

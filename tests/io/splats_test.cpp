@@ -197,14 +197,5 @@ TEST(Splats, are_shaded_as_they_are_displayed) {
     EXPECT_EQ(tests::file_bytes(folder / "out.ply"), tests::file_bytes(folder / "c.ply")) << "nothing is known";
 }
 
-TEST(Splats, that_are_packed_are_refused_by_name) {
-    const TemporaryFolder folder;
-    const fs::path file =
-        write_file(folder / "c.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty uint packed_position\n"
-                                     "property uint packed_rotation\nend_header\n1 2\n");
-    std::vector<std::string> warnings;
-    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(file, warnings); }), "expected plain ones"));
-}
-
 } // namespace
 } // namespace scanshade
