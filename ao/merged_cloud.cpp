@@ -8,6 +8,7 @@
 #include "projection/base/spread.h"
 #include "projection/base/statistics.h"
 #include "projection/base/stopwatch.h"
+#include "projection/project.h"
 #include "projection/sensor/expected_error.h"
 #include "projection/sensor/noise.h"
 
@@ -16,6 +17,13 @@
 #include <fmt/format.h>
 
 namespace scanshade {
+
+/// The frames of a cloud.
+struct MergedCloudAo::Frames {
+    FoundFrames found;
+    bool merged = false; ///< points are means over several pixels and frames: each belongs to the first that saw it
+};
+
 namespace {
 
 using Eigen::Isometry3d, Eigen::Vector3d;
@@ -40,17 +48,21 @@ std::vector<Vector3d> turned_to(const std::vector<Vector3d>& cameras, const Poin
     return normals;
 }
 
-/// Metres per unit of the cloud, by how far depth cameras see: 0.1 to 30 m; what they see at 100 to 30,000 is in
-/// millimetres. 0 = neither.
-double metres_per_unit(const FoundFrames& found, const PointSet& cloud) {
+/// The median distance of points from their cameras, in the cloud's unit.
+double usual_depth(const FoundFrames& found, const PointSet& cloud) {
     std::vector<double> depths;
     for (std::size_t i = 0; i < cloud.points.size(); i += 97)
         if (found.frame[i] >= 0)
             depths.push_back((cloud.points[i] -
                               found.frames[static_cast<std::size_t>(found.frame[i])].world_from_camera.translation())
                                  .norm());
-    const double middle = median(std::move(depths), 0);
-    return middle >= 0.1 && middle <= 30 ? 1 : middle > 100 && middle <= 30000 ? 0.001 : 0;
+    return median(std::move(depths), 0);
+}
+
+/// Metres per unit of the cloud, by how far depth cameras see: 0.1 to 30 m; what they see at 100 to 30,000 is in
+/// millimetres. 0 = neither.
+double metres_per_unit(double depth) {
+    return depth >= 0.1 && depth <= 30 ? 1 : depth > 100 && depth <= 30000 ? 0.001 : 0;
 }
 
 /// Depth as it was recorded, in whole numbers of a unit: coordinates in a file and found cameras are off that by a
@@ -74,18 +86,45 @@ void restore_steps(cv::Mat1f& z_m) {
     }
 }
 
+/// A camera with pixels so many times as wide.
+Pinhole coarser(const Pinhole& camera, double times) {
+    return {camera.fx / times,
+            camera.fy / times,
+            (camera.cx + 0.5) / times - 0.5,
+            (camera.cy + 0.5) / times - 0.5,
+            {static_cast<int>(std::ceil(camera.size.width / times)),
+             static_cast<int>(std::ceil(camera.size.height / times))}};
+}
+
 /// The frames as images of a recording, in metres.
 class FrameImages {
   public:
-    FrameImages(const FoundFrames& found, std::span<const Vector3d> points, double metres)
-        : found_(found), points_(points), metres_(metres) {}
+    /// `wider`: of merged points, how many times as wide as the frames' the pixels are.
+    FrameImages(const FoundFrames& found, bool merged, std::span<const Vector3d> points, double metres, double wider)
+        : found_(found), points_(points), metres_(metres), merged_(merged), wider_(wider) {}
 
     [[nodiscard]] std::size_t size() const { return found_.frames.size(); }
     [[nodiscard]] DepthImage depth(std::size_t index) const {
+        if (merged_)
+            return seen(index);
         cv::Mat1f z_m = found_.depth(index, points_);
         z_m *= metres_;
         restore_steps(z_m);
         return {found_.frames[index].camera, z_m, {}};
+    }
+    /// The pixel of a point in the image of its frame, where it has one.
+    [[nodiscard]] std::optional<cv::Point> pixel(std::size_t index, std::size_t point, const DepthImage& depth) const {
+        if (found_.frame[point] != static_cast<std::int32_t>(index))
+            return std::nullopt;
+        if (!merged_)
+            return cv::Point(found_.pixel[point] % depth.z_m.cols, found_.pixel[point] / depth.z_m.cols);
+        const Vector3d there = pose(index).inverse() * (metres_ * points_[point]);
+        const Eigen::Vector2d at = depth.camera.pixel(there).array().round();
+        if (!(there.z() > 0 && at.x() >= 0 && at.x() < depth.z_m.cols && at.y() >= 0 && at.y() < depth.z_m.rows))
+            return std::nullopt;
+        const cv::Point pixel(static_cast<int>(at.x()), static_cast<int>(at.y()));
+        const double z = static_cast<double>(depth.z_m(pixel));
+        return std::abs(z - there.z()) < same_surface_m(depth.camera, z) ? std::optional(pixel) : std::nullopt;
     }
     [[nodiscard]] Isometry3d pose(std::size_t index) const {
         Isometry3d pose = found_.frames[index].world_from_camera;
@@ -107,9 +146,26 @@ class FrameImages {
     }
 
   private:
+    /// All points that a frame's camera sees, of whatever frame.
+    [[nodiscard]] DepthImage seen(std::size_t index) const {
+        Frame frame;
+        frame.camera.pinhole = coarser(found_.frames[index].camera, wider_);
+        Cloud& cloud = frame.cloud.emplace();
+        cloud.grid = cv::Size(static_cast<int>(points_.size()), 1);
+        const Isometry3d camera_from_world = pose(index).inverse();
+        cloud.points.reserve(points_.size());
+        for (const Vector3d& point : points_)
+            cloud.points.push_back(camera_from_world * (metres_ * point));
+        DepthImage depth = project(frame);
+        depth.source = {}; // of depth images alone are all pixels trusted alike
+        return depth;
+    }
+
     const FoundFrames& found_;
     std::span<const Vector3d> points_;
     double metres_;
+    bool merged_;
+    double wider_;
 };
 
 /// An estimate of visibility, and its expected error.
@@ -133,8 +189,10 @@ bool is_noisy(const DepthNoise& noise) {
 /// Points / pixels of the frames.
 double filled(const FoundFrames& found) {
     const auto points = std::ranges::count_if(found.pixel, [](std::int32_t pixel) { return pixel >= 0; });
-    return static_cast<double>(points) / static_cast<double>(found.frames.front().camera.size.area()) /
-           static_cast<double>(found.frames.size());
+    double pixels = 0;
+    for (const FoundFrame& frame : found.frames)
+        pixels += frame.camera.size.area();
+    return static_cast<double>(points) / pixels;
 }
 
 /// The mean of both, weighted by their squared errors, which are alike to half: 0.2 to 0.65 of ten merged clouds.
@@ -176,28 +234,51 @@ bool MergedCloudAo::looks_for_frames(const PointSet& cloud) const {
            cloud.triangles.empty() && cloud.seen_from.empty() && cloud.points.size() <= rays_.most_at_once();
 }
 
-PointVisibility MergedCloudAo::compute(const PointSet& cloud, const std::optional<Vector3d>& scanner) {
+/// Those that the file names, else those that the order of the points tells; nothing where there are none.
+std::optional<MergedCloudAo::Frames> MergedCloudAo::frames_of(const PointSet& cloud) {
     constexpr double explained = 0.95;
-    std::optional<FoundFrames> found;
+    if (cloud.frames.empty()) {
+        std::optional<FoundFrames> found = found_frames(cloud.points);
+        if (!found || found->share < explained)
+            return std::nullopt;
+        return Frames{*std::move(found)};
+    }
+    Frames named{pixels_of(cloud.frames, cloud.points)};
+    named.merged = named.found.share < explained;
+    for (std::size_t i = 0; named.merged && i < cloud.frames.size(); ++i)
+        std::fill(named.found.frame.begin() + static_cast<std::ptrdiff_t>(cloud.frames[i].first),
+                  named.found.frame.begin() + static_cast<std::ptrdiff_t>(cloud.frames[i].last),
+                  static_cast<std::int32_t>(i));
+    return named;
+}
+
+std::string MergedCloudAo::note_on(const Frames& frames, bool named) {
+    const FoundFrames& found = frames.found;
+    const std::string are = named ? "are named by the file" : "were found in the order of the points";
+    const std::string cameras = "cameras tell the sides of surfaces.";
+    const cv::Size size = found.frames.front().camera.size;
+    if (frames.merged)
+        return fmt::format("{} depth frames {}, which merged their points; their {}", found.frames.size(), are,
+                           cameras);
+    return fmt::format("{} depth frames {}: {:.1f} % of these are pixels of {}x{} images, whose {}",
+                       found.frames.size(), are, 100 * found.share, size.width, size.height, cameras);
+}
+
+PointVisibility MergedCloudAo::compute(const PointSet& cloud, const std::optional<Vector3d>& scanner) {
     const Stopwatch looking;
-    if (looks_for_frames(cloud))
-        found = found_frames(cloud.points);
-    if (!found || found->share < explained)
+    const std::optional<Frames> frames = looks_for_frames(cloud) ? frames_of(cloud) : std::nullopt;
+    if (!frames)
         return rays_.compute(cloud, scanner);
     const double looked_ms = looking.ms();
-    const std::vector<Vector3d> cameras = cameras_of(*found), normals = turned_to(cameras, cloud);
+    const std::vector<Vector3d> cameras = cameras_of(frames->found), normals = turned_to(cameras, cloud);
     PointSet seen = cloud;
     seen.normals = normals;
     seen.seen_from = cameras;
     PointVisibility result = rays_.compute(seen, scanner);
     result.timings.emplace_back("frames found", looked_ms);
-    result.notes.insert(result.notes.begin(),
-                        fmt::format("{} depth frames were found in the order of the points: {:.1f} % of these are "
-                                    "pixels of {}x{} images, whose cameras tell the sides of surfaces.",
-                                    found->frames.size(), 100 * found->share, found->frames.front().camera.size.width,
-                                    found->frames.front().camera.size.height));
+    result.notes.insert(result.notes.begin(), note_on(*frames, !cloud.frames.empty()));
     try {
-        add_images(result, cloud, *found);
+        add_images(result, cloud, *frames);
     } catch (const Outage&) { // concerns more than this cloud
         throw;
     } catch (const Error& failure) {
@@ -206,19 +287,22 @@ PointVisibility MergedCloudAo::compute(const PointSet& cloud, const std::optiona
     return result;
 }
 
-void MergedCloudAo::add_images(PointVisibility& result, const PointSet& cloud, const FoundFrames& found) const {
+void MergedCloudAo::add_images(PointVisibility& result, const PointSet& cloud, const Frames& frames) const {
+    constexpr double wider = 1.25;       // pixels of merged points in their spacings: fewer are filled
     constexpr double least_filled = 0.4; // at 0.3, noise is not found, and images err by 1.7 times what they expect
-    const double metres = metres_per_unit(found, cloud), radius_m = result.radius * metres;
+    const FoundFrames& found = frames.found;
+    const double depth = usual_depth(found, cloud), metres = metres_per_unit(depth), radius_m = result.radius * metres;
     if (metres == 0)
         throw Error("their depth is neither in metres nor in millimetres");
-    if (const double share = filled(found); share < least_filled)
+    if (const double share = filled(found); share < least_filled && !frames.merged)
         throw Error(fmt::format("only {:.0f} % of their pixels hold points, too few to tell depth noise", 100 * share));
     const Stopwatch stopwatch;
     const MethodRow& method = method_named("surfel");
     const std::unique_ptr<MethodSetup> setup = method.setup();
     set(*row_named(setup->parameters(), "radius"), radius_m);
     FrameAo frame_ao(images_.device(), method, *setup, images_.preparation);
-    const FrameImages images(found, cloud.points, metres);
+    const double spacing_px = result.spacing / depth * found.frames.front().camera.fx;
+    const FrameImages images(found, frames.merged, cloud.points, metres, std::max(1.0, wider * spacing_px));
     const DepthNoise noise = images.noise();
     const bool noisy = is_noisy(noise);
     const TooSure factors = too_sure(noisy);
@@ -229,17 +313,18 @@ void MergedCloudAo::add_images(PointVisibility& result, const PointSet& cloud, c
             sequence.add(added, images.depth(added), images.pose(added));
         sequence.forget_before(i - std::min(i, sequence.reach()));
         const SequenceAoResult made = sequence.compute(i);
-        const cv::Mat1f errors = expected_error_of(images.depth(i), made.ao.visibility, radius_m, noise,
+        const DepthImage depth_image = images.depth(i);
+        const cv::Mat1f errors = expected_error_of(depth_image, made.ao.visibility, radius_m, noise,
                                                    frame_ao.errors(noise, share_of_gain(made.others())));
         const FoundFrame& frame = found.frames[i];
         for (std::size_t k = frame.first; k < frame.last; ++k) {
-            if (found.frame[k] != static_cast<std::int32_t>(i))
+            const std::optional<cv::Point> at = images.pixel(i, k, depth_image);
+            if (!at)
                 continue;
-            const int v = found.pixel[k] / frame.camera.size.width, u = found.pixel[k] % frame.camera.size.width;
-            const std::optional<Estimate> image = estimate_at(made.ao.visibility, errors, v, u, noisy);
+            const std::optional<Estimate> image = estimate_at(made.ao.visibility, errors, at->y, at->x, noisy);
             if (!image)
                 continue;
-            const bool flies = std::isnan(made.ao.visibility(v, u)) || std::isnan(result.visibility[k]);
+            const bool flies = std::isnan(made.ao.visibility(*at)) || std::isnan(result.visibility[k]);
             const Estimate best = flies ? *image : mean_of({result.visibility[k], result.error[k]}, *image, factors);
             result.visibility[k] = best.value;
             result.error[k] = best.error;

@@ -16,8 +16,9 @@ struct MergedImages {
     FitPlaneOptions preparation = {};
 };
 
-/// Rays from every point of any cloud. Where found_frames() explains 95 % of the points and more, their cameras tell
-/// the sides of surfaces, and `surfel` computes the frames as those of a recording (ao/sequence). Both estimates miss
+/// Rays from every point of any cloud. Where the cloud's file names its depth frames, or found_frames() explains 95 %
+/// of the points and more, their cameras tell the sides of surfaces, and `surfel` computes the frames as those of a
+/// recording (ao/sequence). Both estimates miss
 /// other things: images what no frame saw and what is behind its surfaces, rays what noise hides. Their mean, each
 /// weighted by its expected error, has less error than either.
 class MergedCloudAo final : public PointMethod {
@@ -37,7 +38,10 @@ class MergedCloudAo final : public PointMethod {
 
   private:
     [[nodiscard]] bool looks_for_frames(const PointSet& cloud) const;
-    void add_images(PointVisibility& result, const PointSet& cloud, const FoundFrames& frames) const;
+    struct Frames;
+    [[nodiscard]] static std::optional<Frames> frames_of(const PointSet& cloud);
+    [[nodiscard]] static std::string note_on(const Frames& frames, bool named);
+    void add_images(PointVisibility& result, const PointSet& cloud, const Frames& frames) const;
 
     CloudAoOptions options_;
     CloudAo rays_;

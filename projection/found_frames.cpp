@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <Eigen/Dense>
+#include <functional>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -681,7 +682,7 @@ Grid common_grid(std::vector<Found>& found, Points points) {
 
 /// Every point that is on a whole pixel of its frame takes it. Of two on one pixel the second has none.
 void take_pixels(FoundFrames& result, const Found& frame, std::size_t index, Points points, const Grid& grid,
-                 std::span<const std::uint32_t> numbers) {
+                 const std::function<std::size_t(std::size_t)>& number) {
     const cv::Size size = grid.size();
     std::vector<char> taken(static_cast<std::size_t>(size.area()), 0);
     for (std::size_t i = frame.range.first; i < frame.range.last; ++i) {
@@ -693,9 +694,19 @@ void take_pixels(FoundFrames& result, const Found& frame, std::size_t index, Poi
         const int pixel = (at.v - grid.top) * size.width + at.u - grid.left;
         if (std::exchange(taken[static_cast<std::size_t>(pixel)], 1) != 0)
             continue;
-        result.frame[numbers[i]] = static_cast<std::int32_t>(index);
-        result.pixel[numbers[i]] = pixel;
+        result.frame[number(i)] = static_cast<std::int32_t>(index);
+        result.pixel[number(i)] = pixel;
     }
+}
+
+/// Of all points, none has a pixel.
+FoundFrames without_pixels(std::size_t points) {
+    return {{}, std::vector<std::int32_t>(points, -1), std::vector<std::int32_t>(points, -1), 0};
+}
+
+double share_on_pixels(const FoundFrames& found, std::size_t points) {
+    const auto on_pixels = std::ranges::count_if(found.pixel, [](std::int32_t pixel) { return pixel >= 0; });
+    return static_cast<double>(on_pixels) / static_cast<double>(std::max<std::size_t>(points, 1));
 }
 
 } // namespace
@@ -724,9 +735,7 @@ std::optional<FoundFrames> found_frames(Points points) {
     const double pixels = static_cast<double>(size.width) * size.height * static_cast<double>(found.size());
     if (pixels > static_cast<double>(most_pixels * finite.size()))
         return std::nullopt;
-    FoundFrames result;
-    result.frame.assign(points.size(), -1);
-    result.pixel.assign(points.size(), -1);
+    FoundFrames result = without_pixels(points.size());
     for (std::size_t i = 0; i < found.size(); ++i) {
         const View& view = found[i].view;
         const Range& range = found[i].range;
@@ -736,10 +745,24 @@ std::optional<FoundFrames> found_frames(Points points) {
                         all.numbers[range.last - 1] + std::size_t(1)};
         made.world_from_camera.translation() += all.middle;
         result.frames.push_back(made);
-        take_pixels(result, found[i], i, finite, grid, all.numbers);
+        take_pixels(result, found[i], i, finite, grid, [&](std::size_t point) { return all.numbers[point]; });
     }
-    const auto on_pixels = std::ranges::count_if(result.pixel, [](std::int32_t pixel) { return pixel >= 0; });
-    result.share = static_cast<double>(on_pixels) / static_cast<double>(finite.size());
+    result.share = share_on_pixels(result, finite.size());
+    return result;
+}
+
+FoundFrames pixels_of(std::span<const FoundFrame> frames, Points points) {
+    FoundFrames result = without_pixels(points.size());
+    result.frames.assign(frames.begin(), frames.end());
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        const Pinhole& camera = frames[i].camera;
+        const Found known{{frames[i].world_from_camera, camera.fx, camera.fy, camera.cx, camera.cy},
+                          {frames[i].first, frames[i].last}};
+        take_pixels(result, known, i, points, {0, 0, camera.size.width - 1, camera.size.height - 1},
+                    [](std::size_t point) { return point; });
+    }
+    const auto finite = std::ranges::count_if(points, [](const Vector3d& point) { return point.allFinite(); });
+    result.share = share_on_pixels(result, static_cast<std::size_t>(finite));
     return result;
 }
 

@@ -45,4 +45,8 @@ struct FoundFrames {
 /// may be rounded to about 1/20,000 of their distance.
 [[nodiscard]] std::optional<FoundFrames> found_frames(std::span<const Eigen::Vector3d> points);
 
+/// The same where the frames are known: every point that is on a whole pixel of its frame takes it. Points of which
+/// other points were merged are on none.
+[[nodiscard]] FoundFrames pixels_of(std::span<const FoundFrame> frames, std::span<const Eigen::Vector3d> points);
+
 } // namespace scanshade

@@ -5,6 +5,7 @@
 #include "projection/base/parameters.h"
 #include "projection/base/splat.h"
 #include "projection/base/station.h"
+#include "projection/found_frames.h"
 #include "projection/maps.h"
 #include "projection/sensor/noise.h"
 
@@ -138,6 +139,7 @@ struct PointSet {
     std::span<const Eigen::Vector3d> seen_from = {}; ///< the camera of each, where cameras are known; else empty
     std::span<const Station> stations = {};          ///< as a file of several scans says; empty = it does not
     std::span<const Splat> splats = {};              ///< what is about each point; empty = they are points of surfaces
+    std::span<const FoundFrame> frames = {}; ///< the depth frames of all, as their file says; empty = it does not
 };
 
 /// Values of points, and what was chosen on the way.

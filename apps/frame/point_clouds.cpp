@@ -6,6 +6,7 @@
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "io/clouds/format.h"
+#include "io/clouds/recorded_frames.h"
 #include "projection/base/error.h"
 #include "projection/pixel_cloud.h"
 #include "projection/project.h"
@@ -74,7 +75,11 @@ PointVisibility visibility_of_points(const Frame& frame, PointMethod& method) {
     set.splats = splats;
     if (cloud.records)
         set.stations = cloud.records->stations;
+    std::vector<std::string> disbelief;
+    const std::vector<FoundFrame> frames = recorded_frames(cloud, disbelief);
+    set.frames = frames;
     PointVisibility found = method.compute(set, scanner_of(frame));
+    std::ranges::move(disbelief, std::back_inserter(found.notes));
     if (!splats.empty())
         found.notes.insert(found.notes.begin(),
                            fmt::format("{} Gaussian splats ({}).", splats.size(), cloud.records->format->name));

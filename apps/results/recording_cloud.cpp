@@ -4,6 +4,7 @@
 #include "apps/picture.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/glb.h"
+#include "io/clouds/recorded_frames.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 #include "projection/base/hash.h"
@@ -38,6 +39,7 @@ void RecordingCloud::add(const CloudFrame& frame) {
     if (resolution_m_ <= 0)
         return; // nothing seen yet
     const Pinhole& camera = depth.camera;
+    const std::size_t first = cells_.size();
     for (int v = 0; v < depth.z_m.rows; ++v)
         for (int u = 0; u < depth.z_m.cols; ++u) {
             const double z = depth.z_m(v, u);
@@ -50,6 +52,7 @@ void RecordingCloud::add(const CloudFrame& frame) {
                       coloured ? &bgr : nullptr);
         }
     ++frames_;
+    images_.push_back({camera, pose, first, cells_.size()});
 }
 
 void RecordingCloud::add(const CloudSweep& sweep) {
@@ -65,6 +68,7 @@ void RecordingCloud::add(const CloudSweep& sweep) {
                   sweep.colours.empty() ? nullptr : &sweep.colours[i]);
     }
     ++frames_;
+    has_sweeps_ = true;
 }
 
 void RecordingCloud::add_point(const Vector3d& point, float weight, float visibility, float confidence,
@@ -122,6 +126,18 @@ void RecordingCloud::write_for_page(const std::filesystem::path& folder, const s
         most);
 }
 
+/// Of images, with all that a later run needs to see the points from where they were seen.
+std::vector<std::string> RecordingCloud::comments(std::span<const Vector3d> points) const {
+    std::vector<std::string> all{fmt::format("one cloud of {} frames, merged within {}", frames_, merged_within())};
+    if (has_sweeps_)
+        return all;
+    std::vector<FoundFrame> images = images_;
+    for (FoundFrame& image : images)
+        image.world_from_camera.translation() *= unit_.told(1);
+    std::ranges::move(frame_comments(images, points), std::back_inserter(all));
+    return all;
+}
+
 void RecordingCloud::write(const std::filesystem::path& file) const {
     const auto [points, colours, visibility, confidence, views] = columns();
     if (lower_extension(file) == ".glb") {
@@ -138,7 +154,7 @@ void RecordingCloud::write(const std::filesystem::path& file) const {
     }
     write_new_ply(file, points, colours,
                   {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}, {"ao_views", views}},
-                  {fmt::format("one cloud of {} frames, merged within {}", frames_, merged_within())});
+                  comments(points));
 }
 
 } // namespace scanshade

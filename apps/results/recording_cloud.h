@@ -1,6 +1,7 @@
 // One cloud of a whole recording: points that several frames saw at the same position become one.
 #pragma once
 
+#include "projection/found_frames.h"
 #include "projection/length_unit.h"
 #include "projection/maps.h"
 
@@ -52,8 +53,9 @@ class RecordingCloud {
     [[nodiscard]] double resolution_m() const { return resolution_m_; }
     /// "0.0043 m": the side of the cubes.
     [[nodiscard]] std::string merged_within() const;
-    /// Binary PLY in world coordinates: ambient_occlusion, ao_confidence, ao_views; binary glTF where the name ends in
-    /// .glb, with grey visibility where no frame had colours. Atomic.
+    /// Binary PLY in world coordinates: ambient_occlusion, ao_confidence, ao_views, and the frames as comments
+    /// (io/clouds/recorded_frames.h); binary glTF where the name ends in .glb, with grey visibility where no frame had
+    /// colours. Atomic.
     void write(const std::filesystem::path& file) const;
     /// The same for a page: FOLDER/STEM.000.js and on, at most so many points.
     void write_for_page(const std::filesystem::path& folder, const std::string& stem, std::size_t most) const;
@@ -66,6 +68,7 @@ class RecordingCloud {
         std::vector<float> visibility, confidence, views;
     };
     [[nodiscard]] Columns columns() const;
+    [[nodiscard]] std::vector<std::string> comments(std::span<const Eigen::Vector3d> points) const;
 
     struct Cell {
         Eigen::Vector3d point = Eigen::Vector3d::Zero();
@@ -84,7 +87,9 @@ class RecordingCloud {
     double resolution_m_;
     LengthUnit unit_;
     int frames_ = 0;
-    std::vector<Cell> cells_; ///< in the order they were added
+    std::vector<Cell> cells_;        ///< in the order they were added
+    std::vector<FoundFrame> images_; ///< those that were added, and the cells that each made first
+    bool has_sweeps_ = false;
     std::unordered_map<Key, std::size_t, KeyHash> index_;
 };
 

@@ -10,9 +10,11 @@
 #include "tests/support/watched.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <gtest/gtest.h>
+#include <map>
 
 namespace scanshade {
 namespace {
@@ -27,6 +29,7 @@ struct Merged {
     std::vector<Vector3d> points;
     std::vector<float> truth;
     std::vector<DepthImage> recorded;
+    std::vector<FoundFrame> frames;
 };
 
 /// So many frames of a scene's walk in world coordinates, as single-precision files have them, with true visibility.
@@ -42,6 +45,7 @@ Merged merged(const char* name, const char* sensor, int frames, double units_per
             if (units_per_metre > 0)
                 depth = static_cast<float>(std::round(units_per_metre * static_cast<double>(depth)) / units_per_metre);
         all.recorded.push_back({camera, z, {}});
+        const std::size_t first = all.points.size();
         const cv::Mat1f truth = scene::true_visibility(world, camera, pose, {radius_m, 64, 1, false}).visibility[0];
         for (int v = 0; v < z.rows; ++v)
             for (int u = 0; u < z.cols; ++u)
@@ -50,6 +54,36 @@ Merged merged(const char* name, const char* sensor, int frames, double units_per
                     all.points.push_back(point.cast<float>().cast<double>());
                     all.truth.push_back(truth(v, u));
                 }
+        all.frames.push_back({camera, pose, first, all.points.size()});
+    }
+    return all;
+}
+
+/// The means of points within cubes, as a joined cloud of a recording has them: a cube belongs to the first frame that
+/// saw it.
+Merged joined(const Merged& cloud, double cube) {
+    Merged all;
+    std::map<std::array<int, 3>, std::size_t> cubes;
+    std::vector<double> counts, truths;
+    for (const FoundFrame& frame : cloud.frames) {
+        const std::size_t first = all.points.size();
+        for (std::size_t i = frame.first; i < frame.last; ++i) {
+            const Eigen::Array3i at = (cloud.points[i] / cube).array().floor().cast<int>();
+            const auto [known, is_new] = cubes.try_emplace({at.x(), at.y(), at.z()}, all.points.size());
+            if (is_new) {
+                all.points.emplace_back(Vector3d::Zero());
+                counts.push_back(0);
+                truths.push_back(0);
+            }
+            all.points[known->second] += cloud.points[i];
+            truths[known->second] += static_cast<double>(cloud.truth[i]);
+            ++counts[known->second];
+        }
+        all.frames.push_back({frame.camera, frame.world_from_camera, first, all.points.size()});
+    }
+    for (std::size_t i = 0; i < all.points.size(); ++i) {
+        all.points[i] /= counts[i];
+        all.truth.push_back(static_cast<float>(truths[i] / counts[i]));
     }
     return all;
 }
@@ -116,6 +150,45 @@ TEST(MergedCloud, recorded_sides_are_not_asked_where_cameras_are_known) {
     const PointVisibility turned =
         MergedCloudAo({.radius = radius_m}, nullptr, on_device()).compute({cloud.points, wrong});
     EXPECT_LT(rmse(turned.visibility, right.visibility), 0.02);
+}
+
+TEST(MergedCloud, frames_that_the_file_names_need_no_order) {
+    const Merged cloud = merged("office", "kinect", 4);
+    Merged part = cloud; // shuffled within each frame
+    for (const FoundFrame& frame : cloud.frames)
+        for (std::size_t i = frame.last - 1; i > frame.first; --i) {
+            const std::size_t k = frame.first + hash(static_cast<std::uint32_t>(i)) % (i - frame.first + 1);
+            std::swap(part.points[i], part.points[k]);
+            std::swap(part.truth[i], part.truth[k]);
+        }
+    const PointVisibility named = MergedCloudAo({.radius = radius_m}, nullptr, on_device())
+                                      .compute({.points = part.points, .frames = part.frames});
+    const PointVisibility unnamed = computed(part.points);
+    EXPECT_FALSE(any_note(unnamed, "depth frames were found"));
+    EXPECT_TRUE(any_note(named, "4 depth frames are named by the file: 100.0 % of these are pixels of 214x160 images"));
+    EXPECT_TRUE(any_note(named, "computed as images, too"));
+    const double error = rmse(named.visibility, part.truth), unknown = rmse(unnamed.visibility, part.truth);
+    std::printf("named: %.3f, expected %.3f; unknown: %.3f\n", error, *named.expected_error, unknown);
+    EXPECT_LT(error, 0.13);
+    EXPECT_LT(error, 0.95 * unknown);
+}
+
+TEST(MergedCloud, points_that_several_frames_share_are_seen_by_their_cameras) {
+    const Merged cloud = joined(merged("office", "kinect", 6), 0.03);
+    const PointVisibility named = MergedCloudAo({.radius = radius_m}, nullptr, on_device())
+                                      .compute({.points = cloud.points, .frames = cloud.frames}),
+                          unknown = computed(cloud.points);
+    EXPECT_TRUE(any_note(named, "6 depth frames are named by the file, which merged their points"));
+    std::size_t away = 0; // of edges, which are smoothed
+    for (const FoundFrame& frame : cloud.frames)
+        for (std::size_t i = frame.first; i < frame.last; ++i)
+            away += named.normals[i].cast<double>().dot(frame.world_from_camera.translation() - cloud.points[i]) < 0;
+    EXPECT_LT(static_cast<double>(away), 0.01 * static_cast<double>(cloud.points.size()));
+    const double error = rmse(named.visibility, cloud.truth), by_rays = rmse(unknown.visibility, cloud.truth);
+    std::printf("joined: %.3f, expected %.3f; unknown: %.3f\n", error, *named.expected_error, by_rays);
+    EXPECT_LT(error, by_rays);
+    EXPECT_GT(*named.expected_error, 0.7 * error);
+    EXPECT_LT(*named.expected_error, 1.4 * error);
 }
 
 TEST(MergedCloud, without_a_device_cameras_tell_sides) {

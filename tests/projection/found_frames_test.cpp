@@ -4,6 +4,7 @@
 #include "projection/base/hash.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <gtest/gtest.h>
@@ -54,7 +55,8 @@ struct Merged {
 
 struct How {
     int frames = 4;
-    double noise = 0.006; ///< times z^2
+    double noise = 0.006;                              ///< times z^2
+    std::array<Pinhole, 2> in_turn = {camera, camera}; ///< of even and of odd frames
     std::function<bool(int frame, int u, int v)> keeps = [](int, int, int) { return true; };
 };
 
@@ -66,12 +68,13 @@ Merged merged(const How& how) {
             for (int u = 5; u < camera.size.width; ++u) {
                 if ((u > 60 && u < 75 && v > 40 && v < 90) || !how.keeps(frame, u, v))
                     continue;
+                const Pinhole& own = how.in_turn[static_cast<std::size_t>(frame % 2)];
                 const Isometry3d at = pose(frame);
                 const int pixel = v * camera.size.width + u;
-                double z = distance(at.translation(), at.linear() * camera.ray(u, v));
+                double z = distance(at.translation(), at.linear() * own.ray(u, v));
                 const auto f = static_cast<std::size_t>(frame), p = static_cast<std::size_t>(pixel);
                 z += how.noise * z * z * (uniform(f, 2 * p) + uniform(f, 2 * p + 1) + uniform(p, f + 9) - 1.5);
-                all.points.push_back((at * camera.point(u, v, z)).cast<float>().cast<double>());
+                all.points.push_back((at * own.point(u, v, z)).cast<float>().cast<double>());
                 all.frame.push_back(frame);
                 all.pixel.push_back(pixel);
             }
@@ -154,6 +157,30 @@ TEST(FoundFrames, coordinates_rounded_to_a_tenth_of_a_millimetre_or_to_one_do) {
             point = (point / step).array().round().matrix() * step;
         expect_frames(made, 4, 30 * step, 0.98);
     }
+}
+
+TEST(FoundFrames, of_known_cameras_any_points_show_their_pixels) {
+    const Merged made = merged({.frames = 3});
+    std::vector<FoundFrame> known;
+    std::vector<Vector3d> points;
+    std::vector<int> pixel;
+    for (int frame = 0; frame < 3; ++frame) {
+        known.push_back({camera, pose(frame), points.size(), 0});
+        for (std::size_t i = 0; i < made.points.size(); ++i)
+            if (made.frame[i] == frame && uniform(i, 3) < 0.05) {
+                points.push_back(made.points[i]);
+                pixel.push_back(made.pixel[i]);
+            }
+        known.back().last = points.size();
+    }
+    EXPECT_FALSE(found_frames(points)) << "too few to show their frames";
+    const FoundFrames found = pixels_of(known, points);
+    EXPECT_EQ(found.share, 1);
+    EXPECT_EQ(std::vector<int>(found.pixel.begin(), found.pixel.end()), pixel);
+    EXPECT_EQ(cv::countNonZero(found.depth(1, points) > 0), static_cast<int>(known[1].last - known[1].first));
+    for (Vector3d& point : points)
+        point += Vector3d(0.01, 0.01, 0.01);
+    EXPECT_LT(pixels_of(known, points).share, 0.5);
 }
 
 TEST(FoundFrames, map_coordinates_and_millimetres_do) {
