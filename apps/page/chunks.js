@@ -3,13 +3,13 @@
 {
   const { unpacked } = scanshade;
 
-  /** 16-bit numbers of zigzag differences in two planes, low bytes first. */
-  const whole_numbers = (bytes, at, count) => {
-    const values = new Uint16Array(count);
+  /** 16-bit numbers of zigzag differences in two planes, low bytes first; of 24 bits in three. */
+  const whole_numbers = (bytes, at, count, planes = 2) => {
+    const values = planes > 2 ? new Uint32Array(count) : new Uint16Array(count), mask = planes > 2 ? 0xffffff : 0xffff;
     let before = 0;
     for (let i = 0; i < count; ++i) {
-      const folded = bytes[at + i] | bytes[at + count + i] << 8;
-      before = (before + (folded & 1 ? -(folded + 1) / 2 : folded / 2)) & 0xffff;
+      const folded = bytes[at + i] | bytes[at + count + i] << 8 | (planes > 2 ? bytes[at + 2 * count + i] << 16 : 0);
+      before = (before + (folded & 1 ? -(folded + 1) / 2 : folded / 2)) & mask;
       values[i] = before;
     }
     return values;
@@ -31,15 +31,16 @@
   };
 
   /**
+   * Of a file of points, the corner and edge of its node's box, and the facts of its cloud.
    * origin: doubles, in the file's system. positions: floats from there, 3 a point, so that a map's coordinates keep their digits.
    * paint: bytes, red green blue and AO's code. more: confidence's code and a normal. fields: {name, low, high, step, whole, codes()}.
    */
-  scanshade.opened_chunk = async (data) => {
-    const { count, box } = data, positions = new Float32Array(3 * count), paint = new Uint8Array(4 * count), more = new Uint8Array(4 * count);
+  scanshade.opened_chunk = async (data, { low, edge }, facts) => {
+    const { count, bits } = data, step = edge / 2 ** bits, planes = bits > 16 ? 3 : 2, positions = new Float32Array(3 * count), paint = new Uint8Array(4 * count), more = new Uint8Array(4 * count);
     const bytes = await unpacked(data.positions);
     for (let axis = 0; axis < 3; ++axis) {
-      const values = whole_numbers(bytes, 2 * count * axis, count);
-      for (let i = 0; i < count; ++i) positions[3 * i + axis] = values[i] * box[3 + axis] / 65535;
+      const values = whole_numbers(bytes, planes * count * axis, count, planes);
+      for (let i = 0; i < count; ++i) positions[3 * i + axis] = (values[i] + 0.5) * step;
     }
     const colour = data.colour ? await unpacked(data.colour) : null;
     if (colour) {
@@ -64,9 +65,9 @@
       }
     }
     // Fields stay packed until they are asked for.
-    const fields = (data.fields || []).map((field, i) => ({ ...field, codes: scanshade.once(async () =>
+    const fields = facts.fields.map((field, i) => ({ ...field, codes: scanshade.once(async () =>
       data.codes[i] ? whole_numbers(await unpacked(data.codes[i]), 0, count) : new Uint16Array(count).fill(1)) }));
-    return { count, origin: box.slice(0, 3), step: box.slice(3).map((size) => size / 65535), positions, paint, more, fields, more_fields: data.more_fields || 0,
+    return { count, origin: low, step: [step, step, step], positions, paint, more, fields, more_fields: facts.more_fields,
       has: { colour: Boolean(colour), ao: true, confidence: Boolean(data.confidence), normal: Boolean(data.normal), sides: Boolean(data.normal) } };
   };
 

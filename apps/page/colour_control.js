@@ -3,8 +3,8 @@
 {
   const { by_id, make, link } = scanshade;
 
-  /** `chunks()`: those shown; `changed()`: draw again. */
-  scanshade.colour_control = ({ chunks, changed }) => {
+  /** `chunks()`: those loaded; `clouds()`: the facts of their clouds; `changed()`: draw again. */
+  scanshade.colour_control = ({ chunks, clouds, changed }) => {
     const select = by_id("point-colour"), strength = by_id("point-strength"), ends = [by_id("range-low"), by_id("range-high")], legend = by_id("class-legend");
     let painter = null, offered = [], chosen = null, range = null, wanted = link.text("colour"), turn = 0;
 
@@ -25,7 +25,7 @@
     const show_classes = () => {
       legend.hidden = !chosen.classes;
       if (legend.hidden) return;
-      const counts = scanshade.class_counts(chunks().map((chunk) => chunk.numbers).filter(Boolean));
+      const counts = scanshade.class_counts(clouds(), chosen.classes);
       const all = [...counts.values()].reduce((sum, count) => sum + count, 0);
       legend.replaceChildren(...[...counts].map(([value, count]) => {
         const swatch = make("span", { class: "swatch" }), share = ` ${(100 * count / all).toFixed(1)} %`;
@@ -43,7 +43,7 @@
       if (number !== turn || !chunk.shape) return; // another choice or source since
       painter.upload_codes(chunk.shape, found.codes);
       chunk.numbers = found;
-      range ??= chosen.range || scanshade.usual_range(found);
+      if (!chunk.inner) range ??= chosen.range || scanshade.usual_range(found); // an inner node is no sample of the whole
     };
     const choose = async (key, keep) => {
       chosen = offered.find((each) => each.key === key) || offered[0];

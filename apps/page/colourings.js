@@ -73,10 +73,10 @@
     return from < to ? [from, to] : [from, from + (step || 1)];
   };
 
-  /** How many points each class has, by its value. */
-  scanshade.class_counts = (all) => {
+  /** How many points of the clouds have each class, by its value. */
+  scanshade.class_counts = (clouds, name) => {
     const counts = new Map();
-    for (const { codes, low } of all) for (const code of codes) if (code > 0) counts.set(low + code - 1, (counts.get(low + code - 1) || 0) + 1);
+    for (const { fields } of clouds) for (const [value, count] of fields.find((each) => each.name === name)?.counts || []) counts.set(value, (counts.get(value) || 0) + count);
     return new Map([...counts].sort((a, b) => a[0] - b[0]));
   };
 

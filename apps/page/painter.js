@@ -195,7 +195,7 @@
         gl.deleteVertexArray(each.vertices);
         for (const buffer of each.buffers) gl.deleteBuffer(buffer);
       },
-      /** look: near, far, size, strength, base, edges, backs, background; clip: two corners. A chunk's range is in its own codes. */
+      /** look: near, far, size, strength, base, edges, backs, background; clip: two corners. A chunk's range is in its own codes; ranges: its parts {first, count, spacing}. */
       draw(chunks, outlines, camera, look) {
         fit_targets();
         const { near, far, clip } = look, clip_from_eye = camera.matrix(canvas.width / canvas.height, near, far);
@@ -217,7 +217,6 @@
         gl.uniform1i(points.at.ramp, 2);
         for (const chunk of chunks) {
           gl.uniform1i(points.at.has_colour, chunk.has.colour ? 1 : 0);
-          gl.uniform1f(points.at.spacing, chunk.spacing || 0);
           gl.uniform1f(points.at.slope, chunk.slope || 0);
           gl.uniform1i(points.at.fronts_only, chunk.has.sides && !look.backs ? 1 : 0);
           gl.uniform2fv(points.at.range, chunk.range || [0, 1]);
@@ -225,7 +224,10 @@
           gl.uniform3fv(points.at.low, clip ? from(clip[0], chunk.origin) : [-1e30, -1e30, -1e30]);
           gl.uniform3fv(points.at.high, clip ? from(clip[1], chunk.origin) : [1e30, 1e30, 1e30]);
           gl.bindVertexArray(chunk.shape.vertices);
-          gl.drawArrays(gl.POINTS, 0, chunk.count);
+          for (const { first, count, spacing } of chunk.ranges || [{ first: 0, count: chunk.count, spacing: 0 }]) {
+            gl.uniform1f(points.at.spacing, spacing);
+            gl.drawArrays(gl.POINTS, first, count);
+          }
         }
         gl.bindFramebuffer(gl.FRAMEBUFFER, null);
         gl.depthFunc(gl.ALWAYS);

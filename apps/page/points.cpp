@@ -1,17 +1,15 @@
 // Points as the page draws them. points.js reads what is written here.
 #include "apps/page/points.h"
 
-#include "ao/raycast/low_discrepancy.h"
 #include "apps/json.h"
+#include "apps/page/octree.h"
 #include "apps/page/text.h"
 #include "io/output_file.h"
 #include "projection/base/indices_where.h"
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-#include <compare>
 #include <cstdint>
 #include <fmt/format.h>
 #include <limits>
@@ -31,13 +29,11 @@ using Eigen::Vector3d;
 struct Box {
     Vector3d low = Vector3d::Zero(), size = Vector3d::Zero();
 
+    /// Of the octree's cube: a little longer than the box, since many points of a regular grid lie exactly in its
+    /// middle, where rounding would decide on which side they are.
+    [[nodiscard]] double edge() const { return 1.001 * size.maxCoeff(); }
     [[nodiscard]] bool holds(const Vector3d& point) const {
         return ((point - low).array() >= 0).all() && ((low + size - point).array() >= 0).all();
-    }
-    /// 0 .. 65535 along an axis.
-    [[nodiscard]] std::uint16_t code(const Vector3d& point, Eigen::Index axis) const {
-        const double share = size[axis] > 0 ? (point[axis] - low[axis]) / size[axis] : 0;
-        return static_cast<std::uint16_t>(std::clamp(share, 0.0, 1.0) * 65535 + 0.5);
     }
 };
 
@@ -75,71 +71,57 @@ Box box_of(std::span<const Vector3d> points) {
     return box;
 }
 
-/// The lower ten bits with two zeros between each.
-std::uint32_t spread(std::uint32_t bits) {
-    bits = (bits | bits << 16) & 0x030000ff;
-    bits = (bits | bits << 8) & 0x0300f00f;
-    bits = (bits | bits << 4) & 0x030c30c3;
-    return (bits | bits << 2) & 0x09249249;
-}
-
-/// A point's place on the Z-order curve (Morton 1966) and its index. Neighbours on the curve are neighbours in space.
-struct Place {
-    std::uint32_t curve, index;
-
-    auto operator<=>(const Place&) const = default; // NOLINT(modernize-use-nullptr)
-};
-
-/// The points in the box along the curve, at most about 2 `most` of them.
-std::vector<Place> along_curve(const Points& cloud, const Box& box, std::size_t most, std::size_t& in_box) {
-    const std::size_t step = std::max<std::size_t>(1, cloud.points.size() / (2 * std::max<std::size_t>(most, 1)));
+/// The places of the points in the box along the curve, evenly chosen where there are more than `most`. The cube of the
+/// curve begins at the box's lower corner.
+std::vector<CurvePlace> along_curve(const Points& cloud, const Box& box, std::size_t most, std::size_t& in_box) {
     const std::vector<std::uint32_t> within = indices_where(
         cloud.points.size(), [&](std::size_t i) { return cloud.points[i].allFinite() && box.holds(cloud.points[i]); });
     in_box = within.size();
-    const double scale = box.size.maxCoeff() > 0 ? 1023 / box.size.maxCoeff() : 0;
-    std::vector<Place> places((within.size() + step - 1) / step);
+    most = std::min(std::max<std::size_t>(most, 1), within.size());
+    const std::size_t step = most > 0 ? std::max<std::size_t>(1, cloud.points.size() / (2 * most)) : 1;
+    constexpr std::uint32_t cells = 1U << octree_bits;
+    const double scale = box.edge() > 0 ? cells / box.edge() : 0;
+    std::vector<CurvePlace> places((within.size() + step - 1) / step);
     tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t i) {
         const std::uint32_t index = within[i * step];
-        const auto cell = [&](Eigen::Index axis) {
-            return spread(static_cast<std::uint32_t>((cloud.points[index][axis] - box.low[axis]) * scale));
-        };
-        places[i] = {cell(0) | cell(1) << 1 | cell(2) << 2, index};
+        std::array<std::uint32_t, 3> cell{};
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const auto along = static_cast<Eigen::Index>(axis);
+            cell[axis] =
+                std::min(static_cast<std::uint32_t>((cloud.points[index][along] - box.low[along]) * scale), cells - 1);
+        }
+        places[i] = {curve_of(cell), index};
     });
     tbb::parallel_sort(places);
+    const std::size_t shown = std::min(places.size(), most);
+    for (std::size_t i = 0; i < shown; ++i)
+        places[i] = places[i * places.size() / shown];
+    places.resize(shown);
     return places;
 }
 
-/// 0 .. count - 1 such that each beginning is spread evenly: the numbers with their bits reversed.
-std::vector<std::uint32_t> even_order(std::size_t count) {
-    const auto bits = static_cast<unsigned>(std::bit_width(count > 0 ? count - 1 : 0));
-    return indices_where(
-        count > 0 ? std::size_t(1) << bits : 0,
-        [&](std::size_t i) {
-            return static_cast<std::uint32_t>(bits_reversed(static_cast<std::uint32_t>(i)) >> 1 >> (31 - bits));
-        },
-        [&](std::uint32_t reversed) { return reversed < count; });
-}
-
-/// Differences of 16-bit numbers, folded so that small ones of either sign have a zero high byte, in two planes.
-void append_planes(std::string& bytes, const std::vector<std::uint16_t>& values) {
+/// Differences of numbers of 16 or 24 bits, folded so that small ones of either sign have zero high bytes, in planes of
+/// bytes, low ones first.
+void append_planes(std::string& bytes, const std::vector<std::uint32_t>& values, int planes = 2) {
     const std::size_t at = bytes.size(), count = values.size();
-    bytes.resize(at + 2 * count);
-    std::uint16_t before = 0;
+    bytes.resize(at + static_cast<std::size_t>(planes) * count);
+    const int unused = 32 - 8 * planes;
+    std::uint32_t before = 0;
     for (std::size_t i = 0; i < count; ++i) {
-        const auto apart = static_cast<std::int16_t>(static_cast<std::uint16_t>(values[i] - before));
-        const auto folded = static_cast<std::uint16_t>(apart < 0 ? -2 * apart - 1 : 2 * apart);
-        bytes[at + i] = static_cast<char>(folded);
-        bytes[at + count + i] = static_cast<char>(folded >> 8);
+        const auto apart = static_cast<std::int32_t>((values[i] - before) << unused) >> unused;
+        const auto folded = static_cast<std::uint32_t>(apart < 0 ? -2 * apart - 1 : 2 * apart);
+        for (int plane = 0; plane < planes; ++plane)
+            bytes[at + static_cast<std::size_t>(plane) * count + i] = static_cast<char>(folded >> (8 * plane));
         before = values[i];
     }
 }
 
 /// Differences of bytes, point by point.
 template <class Value>
-void append_differences(std::string& bytes, std::span<const std::uint32_t> chunk, Value&& value) {
+void append_differences(std::string& bytes, std::span<const CurvePlace> chunk, Value&& value) {
     std::uint8_t before = 0;
-    for (const std::uint32_t point : chunk) {
-        const std::uint8_t now = value(point);
+    for (const CurvePlace& place : chunk) {
+        const std::uint8_t now = value(place.index);
         bytes += static_cast<char>(now - before);
         before = now;
     }
@@ -172,6 +154,7 @@ std::array<std::uint8_t, 2> normal_codes(const Eigen::Vector3f& normal) {
 struct Scale {
     double low = std::numeric_limits<double>::infinity(), high = -low;
     bool holes = false, whole = false;
+    std::vector<std::uint64_t> counts = {}; ///< of the values 0 .. 255, where there is room for them
 
     static constexpr double steps = 65534;
     /// 3e38 and the like mark what is not known, as in coordinates.
@@ -180,6 +163,14 @@ struct Scale {
         holes = holes || !is_known(value);
         low = is_known(value) ? std::min(low, value) : low;
         high = is_known(value) ? std::max(high, value) : high;
+        if (!counts.empty() && value >= 0 && value < static_cast<double>(counts.size()))
+            ++counts[static_cast<std::size_t>(value)];
+    }
+    void join(const Scale& other) {
+        low = std::min(low, other.low), high = std::max(high, other.high);
+        holes = holes || other.holes;
+        for (std::size_t i = 0; i < counts.size(); ++i)
+            counts[i] += other.counts[i];
     }
     [[nodiscard]] bool known() const { return low <= high; }
     [[nodiscard]] double step() const { return whole && high - low <= steps ? 1 : (high - low) / steps; }
@@ -192,10 +183,12 @@ struct Scale {
 };
 
 /// Of those fields that are written, over the points shown.
-std::vector<Scale> scales_of(const Points& cloud, const std::vector<std::uint32_t>& shown) {
+std::vector<Scale> scales_of(const Points& cloud, std::span<const CurvePlace> shown) {
     std::vector<Scale> none(std::min(cloud.fields.size(), most_fields));
-    for (std::size_t i = 0; i < none.size(); ++i)
+    for (std::size_t i = 0; i < none.size(); ++i) {
         none[i].whole = cloud.fields[i].whole;
+        none[i].counts.resize(none[i].whole ? 256 : 0);
+    }
     if (none.empty())
         return none;
     return tbb::parallel_reduce(
@@ -203,40 +196,46 @@ std::vector<Scale> scales_of(const Points& cloud, const std::vector<std::uint32_
         [&](const tbb::blocked_range<std::size_t>& range, std::vector<Scale> scales) {
             std::vector<double> values(cloud.fields.size());
             for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                cloud.read(shown[i], values);
+                cloud.read(shown[i].index, values);
                 for (std::size_t k = 0; k < scales.size(); ++k)
                     scales[k].take(values[k]);
             }
             return scales;
         },
         [](std::vector<Scale> a, const std::vector<Scale>& b) {
-            for (std::size_t k = 0; k < a.size(); ++k) {
-                a[k].low = std::min(a[k].low, b[k].low), a[k].high = std::max(a[k].high, b[k].high);
-                a[k].holes = a[k].holes || b[k].holes;
-            }
+            for (std::size_t k = 0; k < a.size(); ++k)
+                a[k].join(b[k]);
             return a;
         });
 }
 
-/// Names and scales of the fields that have a value anywhere, for every chunk.
-std::string fields_text(const Points& cloud, const std::vector<Scale>& scales) {
+/// Names and scales of the fields that have a value anywhere, and how many points have each value of 0 .. 255.
+json fields_json(const Points& cloud, const std::vector<Scale>& scales) {
     json fields = json::array();
-    for (std::size_t k = 0; k < scales.size(); ++k)
-        if (scales[k].known())
-            fields.push_back({{"name", cloud.fields[k].name},
-                              {"low", scales[k].low},
-                              {"high", scales[k].high},
-                              {"step", scales[k].step()},
-                              {"whole", scales[k].whole}});
-    return for_script(json_line(fields));
+    for (std::size_t k = 0; k < scales.size(); ++k) {
+        const Scale& scale = scales[k];
+        if (!scale.known())
+            continue;
+        fields.push_back({{"name", cloud.fields[k].name},
+                          {"low", scale.low},
+                          {"high", scale.high},
+                          {"step", scale.step()},
+                          {"whole", scale.whole}});
+        if (!scale.whole || scale.low < 0 || scale.high > 255)
+            continue;
+        for (std::size_t value = 0; value < scale.counts.size(); ++value)
+            if (scale.counts[value] > 0)
+                fields.back()["counts"].push_back({value, scale.counts[value]});
+    }
+    return fields;
 }
 
 /// The codes of these fields, one text each; empty where all points have `low`.
-std::string codes_text(const Points& cloud, const std::vector<Scale>& scales, std::span<const std::uint32_t> chunk) {
-    std::vector<std::vector<std::uint16_t>> codes(scales.size(), std::vector<std::uint16_t>(chunk.size()));
+std::string codes_text(const Points& cloud, const std::vector<Scale>& scales, std::span<const CurvePlace> chunk) {
+    std::vector<std::vector<std::uint32_t>> codes(scales.size(), std::vector<std::uint32_t>(chunk.size()));
     std::vector<double> values(cloud.fields.size());
     for (std::size_t i = 0; i < chunk.size() && !scales.empty(); ++i) {
-        cloud.read(chunk[i], values);
+        cloud.read(chunk[i].index, values);
         for (std::size_t k = 0; k < scales.size(); ++k)
             codes[k][i] = scales[k].known() ? scales[k].code(values[k]) : std::uint16_t(0);
     }
@@ -252,15 +251,28 @@ std::string codes_text(const Points& cloud, const std::vector<Scale>& scales, st
     return text;
 }
 
-/// The parts of a chunk; `chunk` holds indices of points, along the curve.
-std::string parts_of(const Points& cloud, const Box& box, std::span<const std::uint32_t> chunk) {
+/// Bits along an axis of the node's box: 16 in the deepest nodes, and equal steps in all, as far as the curve's bits
+/// go.
+int bits_of(const OctreeNode& node, const Octree& tree) {
+    return std::min(octree_bits, 16 + tree.deepest()) - node.level;
+}
+
+/// The positions in a node's box, as whole numbers of `bits` bits.
+std::string positions_text(std::span<const CurvePlace> chunk, int level, int bits) {
     std::string bytes;
-    std::vector<std::uint16_t> codes(chunk.size());
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-        std::ranges::transform(chunk, codes.begin(), [&](std::uint32_t i) { return box.code(cloud.points[i], axis); });
-        append_planes(bytes, codes);
+    std::vector<std::uint32_t> codes(chunk.size());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        std::ranges::transform(chunk, codes.begin(), [&](const CurvePlace& place) {
+            return cell_of(place.curve)[axis] >> (octree_bits - level - bits) & ((1U << bits) - 1);
+        });
+        append_planes(bytes, codes, bits > 16 ? 3 : 2);
     }
-    std::string text = fmt::format(",\"positions\":\"{}\"", packed(bytes));
+    return packed(bytes);
+}
+
+/// What points have besides their positions.
+std::string parts_of(const Points& cloud, std::span<const CurvePlace> chunk) {
+    std::string bytes, text;
     if (!cloud.colours.empty()) {
         bytes.clear(); // red and blue as differences to green, which mostly are the same for neighbours
         append_differences(bytes, chunk, [&](std::uint32_t i) { return cloud.colours[i][1]; });
@@ -289,18 +301,12 @@ std::string parts_of(const Points& cloud, const Box& box, std::span<const std::u
     return text;
 }
 
-/// The median distance between points that follow each other on the curve.
-double spacing_of(const Points& cloud, const std::vector<std::uint32_t>& shown) {
-    constexpr std::size_t most_pairs = 5000;
-    std::vector<double> apart;
-    const std::size_t step = std::max<std::size_t>(1, shown.size() / most_pairs);
-    for (std::size_t i = 0; i + 1 < shown.size(); i += step)
-        apart.push_back((cloud.points[shown[i + 1]] - cloud.points[shown[i]]).norm());
-    if (apart.empty())
-        return 0;
-    const auto middle = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 2);
-    std::ranges::nth_element(apart, middle);
-    return *middle;
+/// The octree for the page: of each node its parent's number, octant, count and spacing.
+json tree_json(const Octree& tree) {
+    json nodes = json::array();
+    for (const OctreeNode& node : tree.nodes)
+        nodes.push_back({node.parent, node.octant, node.count, std::stod(fmt::format("{:.4g}", node.spacing))});
+    return nodes;
 }
 
 } // namespace
@@ -309,40 +315,48 @@ std::vector<fs::path> write_points(const fs::path& folder, const fs::path& stem,
                                    std::size_t most) {
     const Box box = box_of(cloud.points);
     std::size_t in_box = 0;
-    std::vector<std::uint32_t> shown; // along the curve
-    {
-        const std::vector<Place> places = along_curve(cloud, box, most, in_box);
-        shown.resize(std::min(places.size(), most));
-        for (std::size_t i = 0; i < shown.size(); ++i)
-            shown[i] = places[i * places.size() / shown.size()].index;
-    }
-    if (shown.empty())
+    const std::vector<CurvePlace> places = along_curve(cloud, box, most, in_box);
+    if (places.empty())
         return {};
     const std::size_t finite =
         indices_where(cloud.points.size(), [&](std::size_t i) { return cloud.points[i].allFinite(); }).size();
-    std::vector<std::uint32_t> order = even_order(shown.size());
-    const std::size_t parts = (order.size() + points_in_a_chunk - 1) / points_in_a_chunk;
-    const std::vector<Scale> scales = scales_of(cloud, shown);
-    const std::string facts =
-        fmt::format(",\"parts\":{},\"total\":{},\"of\":{},\"left_out\":{},\"spacing\":{:.5g},\"up\":[{}],"
-                    "\"box\":[{},{},{},{},{},{}],\"fields\":{},\"more_fields\":{}",
-                    parts, shown.size(), finite, finite - in_box, spacing_of(cloud, shown),
-                    fmt::format("{:.6g},{:.6g},{:.6g}", cloud.up.x(), cloud.up.y(), cloud.up.z()), box.low.x(),
-                    box.low.y(), box.low.z(), box.size.x(), box.size.y(), box.size.z(), fields_text(cloud, scales),
-                    cloud.fields.size() - scales.size());
-    std::vector<fs::path> files(parts);
-    tbb::parallel_for(std::size_t(0), parts, [&](std::size_t part) {
-        const auto begin = order.begin() + static_cast<std::ptrdiff_t>(part * points_in_a_chunk);
-        const auto end = part + 1 < parts ? begin + points_in_a_chunk : order.end();
-        std::sort(begin, end); // along the curve again: small differences
-        std::vector<std::uint32_t> chunk(static_cast<std::size_t>(end - begin));
-        std::transform(begin, end, chunk.begin(), [&](std::uint32_t place) { return shown[place]; });
-        files[part] = fs::path(fmt::format("{}.{:03}.js", stem.string(), part));
-        write_atomically(folder / files[part],
-                         fmt::format("scanshade.points({{\"part\":{},\"count\":{}{}{},\"codes\":[{}]}})\n", part,
-                                     chunk.size(), facts, parts_of(cloud, box, chunk),
-                                     codes_text(cloud, scales, chunk)));
+    const Octree tree = octree_of(places, box.edge(), [&](std::uint32_t a, std::uint32_t b) {
+        return (cloud.points[a] - cloud.points[b]).norm();
     });
+    const std::vector<Scale> scales = scales_of(cloud, places);
+    const json facts{{"tree", tree_json(tree)},
+                     {"total", places.size()},
+                     {"of", finite},
+                     {"left_out", finite - in_box},
+                     {"up", {cloud.up.x(), cloud.up.y(), cloud.up.z()}},
+                     {"cube", {box.low.x(), box.low.y(), box.low.z(), box.edge()}},
+                     {"fields", fields_json(cloud, scales)},
+                     {"more_fields", cloud.fields.size() - scales.size()}};
+    std::vector<fs::path> files(tree.nodes.size());
+    for (std::size_t part = 0; part < files.size(); ++part)
+        files[part] = fmt::format("{}.{:03}.js", stem.string(), part);
+    const auto write = [&](std::size_t part) {
+        const OctreeNode& node = tree.nodes[part];
+        const std::vector<CurvePlace> chunk = tree.own(node, places);
+        const int bits = bits_of(node, tree);
+        write_atomically(folder / files[part],
+                         fmt::format("scanshade.points({{\"part\":{},\"count\":{},\"bits\":{}{},\"positions\":\"{}\"{},"
+                                     "\"codes\":[{}]}})\n",
+                                     part, chunk.size(), bits,
+                                     part == 0 ? ",\"facts\":" + for_script(json_line(facts)) : "",
+                                     positions_text(chunk, node.level, bits), parts_of(cloud, chunk),
+                                     codes_text(cloud, scales, chunk)));
+    };
+    try {
+        tbb::parallel_for(std::size_t(1), files.size(), write);
+        write(0); // where the first file is, all are
+    } catch (...) {
+        for (const fs::path& file : files) {
+            std::error_code gone_already;
+            fs::remove(folder / file, gone_already);
+        }
+        throw;
+    }
     return files;
 }
 

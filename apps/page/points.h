@@ -1,4 +1,4 @@
-// Points as the page draws them: chunks of 100,000 in an order of which each beginning is an even sample of the whole.
+// Points as the page draws them: the nodes of an octree, a file each, of which the page loads those that a view needs.
 #pragma once
 
 #include <cstddef>
@@ -30,13 +30,14 @@ struct Points {
     std::function<void(std::size_t point, std::span<double> values)> read = {};
 };
 
-inline constexpr std::size_t points_in_a_chunk = 100000;
 inline constexpr std::size_t most_fields = 24; ///< those behind are counted, not written
 
-/// Writes FOLDER/STEM.000.js, FOLDER/STEM.001.js ... of at most `most` points; returns these names without the folder.
-/// Positions get 16 bits in a box round all but stray points, which are left out. Fields get 16 bits, exact for
-/// integers that differ by less than 65535. Each file is atomic; equal inputs give equal bytes. Memory: 16 bytes for
-/// each of at most 2 `most` points, and a few megabytes for each core.
+/// Writes FOLDER/STEM.000.js, FOLDER/STEM.001.js ... of at most `most` points, evenly chosen; returns these names
+/// without the folder. Each point is in one file: a node of an octree (octree.h), the first its root. The octree's cube
+/// is round all but stray points, which are left out. Positions have 16 bits in the boxes of the deepest nodes, and the
+/// same steps in all. Fields get 16 bits, exact for integers that differ by less than 65535. Each file is atomic, the
+/// first is written last, and after an error none is left; equal inputs give equal bytes. Memory: 16 bytes for each of
+/// at most 2 `most` points, and a few megabytes for each core.
 std::vector<std::filesystem::path> write_points(const std::filesystem::path& folder, const std::filesystem::path& stem,
                                                 const Points& cloud, std::size_t most);
 

@@ -18,9 +18,11 @@
     const camera = scanshade.camera(), picked = scanshade.picked_points(stage);
     scanshade.shown_camera = () => camera;
     scanshade.shown_box = () => box;
+    scanshade.shown_chunks = () => in_picture;
     let painter = null, shown = false, row = null, source = null, loading = 0, said = "";
-    let chunks = [], outlines = [], box = null, sample = [], facing = [0, 0, 0];
-    let moving = false, rest = 0, drawn_ms = 0, asked_view = link.camera();
+    let chunks = [], in_picture = [], outlines = [], box = null, sample = [], facing = [0, 0, 0];
+    let moving = false, moves = 0, drawn_ms = 0, drawn_points = 0, asked_view = link.camera();
+    const most_drawn = 1.5e6, least_drawn = 1e5;
 
     const grow_box = ({ positions, origin }) => {
       const step = 3 * Math.max(1, Math.floor(positions.length / 3 / 20000)), axes = [[], [], []];
@@ -38,6 +40,8 @@
         chunk.shape = null;
       }
       chunks = [];
+      in_picture = [];
+      trees.clear();
       box = null;
       sample = [];
       picked.clear();
@@ -50,11 +54,26 @@
       return sum.map((value) => value / (127 * Math.max(1, chunk.count)));
     };
 
+    const in_all = (some) => some.reduce((sum, chunk) => sum + chunk.count, 0);
     const tell = () => {
-      const count = chunks.reduce((sum, chunk) => sum + chunk.count, 0);
-      const of = source?.of > count ? ` of ${source.of.toLocaleString("en")}` : "", left_out = source?.left_out ? `, ${source.left_out} far away left out` : "";
-      by_id("point-readout").textContent = said || `${count.toLocaleString("en")} points${of}${left_out}${loading ? ", loading" : ""}`;
+      const words = (value) => value.toLocaleString("en"), count = source?.total ?? in_all(chunks), drawn = in_all(in_picture);
+      const of = source?.of > count ? ` of ${words(source.of)}` : "", left_out = source?.left_out ? `, ${source.left_out} far away left out` : "";
+      const waits = loading || !trees.is_settled(), part = trees.is_open() && drawn < count ? `, ${words(drawn)} in this view` : "";
+      const text = said || `${words(count)} points${of}${left_out}${part}${waits ? ", loading" : ""}`, readout = by_id("point-readout");
+      if (readout.textContent !== text) readout.textContent = text;
     };
+    /** More points of an open cloud. */
+    const take = (chunk) => {
+      chunk.shape = painter.upload(chunk);
+      chunks.push(chunk);
+      return colours.take(chunk);
+    };
+    const drop = (chunk) => {
+      painter.release(chunk.shape);
+      chunk.shape = null;
+      chunks.splice(chunks.indexOf(chunk), 1);
+    };
+    const trees = scanshade.octrees({ take, drop, changed: () => draw(), failed: (failure) => { said = failure.message; } });
 
     const take_source = (next) => {
       if (!painter || source?.key === next?.key) return;
@@ -69,11 +88,12 @@
         return tell();
       }
       loading = 1;
+      delete canvas.dataset.loaded;
       let offered = null;
-      next.load((chunk, facts) => {
+      const use = (chunk, facts) => {
         if (number !== loading_number) return false;
         if (chunk.count === 0) return true;
-        Object.assign(source, facts);
+        for (const sum of ["total", "of", "left_out"]) if (sum in facts) source[sum] = (source[sum] || 0) + facts[sum];
         chunk.shape = painter.upload(chunk);
         chunks.push(chunk);
         grow_box(chunk);
@@ -90,11 +110,12 @@
         draw();
         tell();
         return true;
-      }).then(() => offered).catch((failure) => { if (number === loading_number) said = failure.message; }).finally(() => {
+      };
+      (next.stems ? trees.open(next.stems, use) : next.load(use)).then(() => offered).catch((failure) => { if (number === loading_number) said = failure.message; }).finally(() => {
         if (number !== loading_number) return;
         loading = 0;
         if (chunks.length === 0 && !said) said = "no points";
-        canvas.dataset.loaded = source.key;
+        if (chunks.length === 0) canvas.dataset.loaded = source.key;
         tell();
         draw();
       });
@@ -163,30 +184,40 @@
       const reach = box ? Math.hypot(...box[1].map((v, i) => v - box[0][i])) : 1;
       const away = box ? Math.hypot(...box[0].map((v, i) => (v + box[1][i]) / 2 - camera.eye[i])) : 1;
       const far = 3 * reach + away, near = far / 20000;
-      // While the view moves, only as many chunks as were drawn in time: each prefix is an even sample.
-      const busy = moving && drawn_ms > 60 && chunks.length > 1;
-      const some = busy ? chunks.slice(0, Math.max(1, Math.floor(chunks.length * 60 / drawn_ms))) : chunks;
+      // While the view moves, only as many points as were drawn in time.
+      const busy = moving && drawn_ms > 60 && drawn_points > 0, share = busy ? 60 / drawn_ms : 1;
+      if (trees.is_open()) in_picture = trees.choose(camera, [width, height], clip.corners(), busy ? Math.max(least_drawn, drawn_points * share) : most_drawn, !busy);
+      else in_picture = chunks.slice(0, Math.max(1, Math.floor(chunks.length * share)));
       const began = performance.now();
       draw_cameras();
-      // A part of the points stands farther apart than all of them.
-      const count = (all) => all.reduce((sum, chunk) => sum + chunk.count, 0);
-      const scarce = Math.sqrt(Math.max(1, (source?.total || count(chunks)) / Math.max(1, count(some))));
-      painter.draw(some, outlines, camera, {
+      // A part of the frames' points stands farther apart than all of them.
+      const scarce = trees.is_open() ? 1 : Math.sqrt(in_all(chunks) / Math.max(1, in_all(in_picture)));
+      painter.draw(in_picture, outlines, camera, {
         near, far, size: scarce * value("point-size") / 3, ...colours.look(), clip: clip.corners(),
         edges: by_id("point-edl").checked, backs: by_id("point-backs").checked, background: [0.08, 0.09, 0.105],
       });
       picked.draw_marks(camera);
       put_link();
-      if (!busy && chunks.length > 1) painter.when_done(() => { drawn_ms = performance.now() - began; });
+      if (!busy) {
+        const count = in_all(in_picture);
+        painter.when_done(() => { [drawn_ms, drawn_points] = [performance.now() - began, count]; });
+        if (!loading && source && trees.is_settled()) canvas.dataset.loaded = source.key;
+        tell();
+      }
       canvas.dataset.drawn = String(Number(canvas.dataset.drawn || 0) + 1);
       if (!moving) return;
-      clearTimeout(rest);
-      rest = setTimeout(() => { moving = false; draw(); }, 200);
+      // All points come once the view rests: a while after the device is done, which on a slow one is long after the call.
+      const until = moves;
+      painter.when_done(() => setTimeout(() => {
+        if (until !== moves || !moving) return;
+        moving = false;
+        draw();
+      }, 200));
     };
     const draw = scanshade.once_per_picture(render);
-    const colours = scanshade.colour_control({ chunks: () => chunks, changed: draw }), clip = scanshade.clip_control(draw);
+    const colours = scanshade.colour_control({ chunks: () => chunks, clouds: trees.clouds, changed: draw }), clip = scanshade.clip_control(draw);
     if (link.numbers("size", 1)) by_id("point-size").value = link.numbers("size", 1)[0];
-    const moved = () => { moving = true; clearTimeout(rest); camera.stop(); draw(); };
+    const moved = () => { moving = true; ++moves; delete canvas.dataset.loaded; camera.stop(); draw(); };
 
     // ------------------------------------------------------------------------------------------------ hands
 
@@ -197,7 +228,7 @@
         if (limits && place.some((value, axis) => value < limits[0][axis] || value > limits[1][axis])) return true;
         return fronts_only && has.sides && from_eye.reduce((sum, value, axis) => sum + value * (more[4 * i + 1 + axis] << 24 >> 24), 0) > 0;
       };
-      await picked.take(scanshade.point_at(chunks, camera, [x - edge.left, y - edge.top], [edge.width, edge.height], hidden));
+      await picked.take(scanshade.point_at(in_picture, camera, [x - edge.left, y - edge.top], [edge.width, edge.height], hidden));
       draw();
     };
 

@@ -87,7 +87,7 @@ std::string shell(const Part& body, std::string_view title, const std::vector<Pa
 
 std::string run_shell(std::string_view title) {
     return shell(page_html, title,
-                 {core_js, link_js, table_js, plots_js, maps_js, frames_js, camera_js, chunks_js, sources_js,
+                 {core_js, link_js, table_js, plots_js, maps_js, frames_js, camera_js, chunks_js, octree_js, sources_js,
                   painter_js, colourings_js, colour_control_js, clip_js, picking_js, points_js, run_js});
 }
 

@@ -8,9 +8,12 @@
 #include "projection/base/nearest_word.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cstdint>
 #include <cstdio>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <limits>
 #include <map>
 #include <set>
 #include <sstream>
@@ -71,6 +74,17 @@ std::set<std::string> words_of(const std::string& list) {
     return words;
 }
 
+std::size_t page_points_from(const std::string& text) {
+    std::size_t most = std::numeric_limits<std::uint32_t>::max(); // points are numbered with 32 bits
+    if (text == "all")
+        return most;
+    const auto [end, trouble] = std::from_chars(text.data(), text.data() + text.size(), most);
+    if (trouble != std::errc() || end != text.data() + text.size() || most < 1000)
+        throw Misuse("page-points: '" + text + "' given, expected all or a number from 1000 on" +
+                     suggestion(text, {"all"}));
+    return most;
+}
+
 Outputs outputs_from(const RunSettings& asked) {
     Outputs wanted;
     wanted.format = asked.format;
@@ -81,7 +95,7 @@ Outputs outputs_from(const RunSettings& asked) {
     wanted.colour_view = asked.colour_view;
     wanted.frames_in_tar = static_cast<std::size_t>(asked.frames_in_tar);
     wanted.preview = asked.page && asked.frames_in_tar == 0;
-    wanted.page_points = static_cast<std::size_t>(asked.page_points);
+    wanted.page_points = page_points_from(asked.page_points);
     if (asked.write != "auto") {
         const std::set<std::string> words = words_of(asked.write);
         wanted.ao = words.contains("ao");
@@ -396,10 +410,9 @@ std::vector<Stage> RunSettings::common_stages() { // NOLINT(readability-function
            .common = true,
            .affects = Affects::outputs},
           {.name = "page-points",
-           .help = "points of a cloud on the page, at most; the page says where there are more",
+           .help = "points of a cloud on the page, at most, or all; the page loads those that a view needs, and says "
+                   "where the cloud has more",
            .value = &s.page_points,
-           .low = 1000,
-           .high = 20e6,
            .affects = Affects::outputs},
           {.name = "tar",
            .help = "results of so many frames go into one tar, tars/000000.tar and on, as WebDataset reads them; 0 = "

@@ -59,7 +59,7 @@ class RunSettings {
     double cloud_resolution_m = 0;
     CloudColours colour_cloud = CloudColours::kept;
     bool page = true;
-    int page_points = 1000000;
+    std::string page_points = "1000000";
     int frames_in_tar = 0;
     bool overwrite = false, resume = false, retry = false;
     std::string shard, scratch;

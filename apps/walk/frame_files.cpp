@@ -241,8 +241,9 @@ void remove_files(Work& work, const Outputs& outputs) {
     std::error_code gone_already;
     for (const auto& file : files_of(work.entry, outputs))
         std::filesystem::remove(file, gone_already);
-    for (std::size_t part = 0; outputs.preview && part * page::points_in_a_chunk < outputs.page_points; ++part)
-        std::filesystem::remove(outputs.files_folder() / points_file(work.entry.name, part), gone_already);
+    const auto points = [&](std::size_t part) { return outputs.files_folder() / points_file(work.entry.name, part); };
+    for (std::size_t part = 0; outputs.preview && std::filesystem::remove(points(part), gone_already); ++part)
+        continue;
 }
 
 void write_intermediates(const std::filesystem::path& folder, const std::vector<Intermediate>& all) {

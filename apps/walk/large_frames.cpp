@@ -25,7 +25,10 @@ LargeSettings LargeFrames::settings(const std::string& name) const {
     const Outputs& outputs = options_.outputs;
     constexpr std::size_t judged = 65536; // points that tell whether values are to be doubted
     const bool shows = outputs.preview || outputs.shaded || outputs.panel || outputs.glb || outputs.mcap;
-    settings.shown = std::max<std::size_t>(shows ? outputs.page_points : std::min(outputs.page_points, judged), 1);
+    // About 100 bytes each, in memory: no more of them than points that are computed at once.
+    const std::size_t most = std::max<std::size_t>(options_.points->most_at_once(), 1000000);
+    settings.shown =
+        std::clamp<std::size_t>(shows ? outputs.page_points : std::min(outputs.page_points, judged), 1, most);
     constexpr double bytes_per_point = 420;
     const double memory = bytes_per_point * static_cast<double>(options_.points->most_at_once());
     settings.buffers = static_cast<std::size_t>(std::clamp(memory / 4, 8.0 * (1 << 20), 64.0 * (1 << 20)));

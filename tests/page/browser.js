@@ -340,30 +340,60 @@ const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
   await check("points of a cloud", async (open_page) => {
     const page = await open_page(cloud);
     await points_of(page);
-    expect((await page.textContent("#point-readout")) === spec.cloud_said, await page.textContent("#point-readout"));
+    expect((await page.textContent("#point-readout")).startsWith(spec.cloud_said), await page.textContent("#point-readout"));
     expect(apart(await pixel(page, "#point-stage", 0.5, 0.5), background) > 20, "the centre is background");
-    // Each chunk spans the whole cloud, and positions are as stored to a 65535th of the box.
+    // The root spans the whole cloud as an even sample; all nodes together are the cloud, without the stray point.
     const found = await page.evaluate(async (stem) => {
-      const all = [];
-      for (let part = 0; part < 2; ++part) {
-        const chunk = await scanshade.opened_chunk(await scanshade.load(`${stem}.00${part}.js`));
-        const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-        for (let i = 0; i < chunk.count; ++i) for (let axis = 0; axis < 3; ++axis) {
-          low[axis] = Math.min(low[axis], chunk.origin[axis] + chunk.positions[3 * i + axis]);
-          high[axis] = Math.max(high[axis], chunk.origin[axis] + chunk.positions[3 * i + axis]);
+      const nodes = await scanshade.octree_nodes(stem), low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity], parts = Array(4).fill(0), places = new Set();
+      let all = 0;
+      for (const node of nodes) {
+        const chunk = await node.load(), place = (i, axis) => chunk.origin[axis] + chunk.positions[3 * i + axis];
+        for (let i = 0; i < chunk.count; ++i) {
+          ++all;
+          places.add([0, 1, 2].map((axis) => place(i, axis).toFixed(5)).join());
+          if (node !== nodes[0]) continue;
+          for (let axis = 0; axis < 3; ++axis) [low[axis], high[axis]] = [Math.min(low[axis], place(i, axis)), Math.max(high[axis], place(i, axis))];
+          ++parts[(place(i, 0) < 0.01) * 2 + (place(i, 1) < 1)]; // floor or wall, and its halves
         }
-        let sides = 0;
-        for (let i = 0; i < chunk.count; ++i) sides += chunk.origin[0] + chunk.positions[3 * i] < (low[0] + high[0]) / 2;
-        all.push({ count: chunk.count, low, high, share: sides / chunk.count });
       }
-      return all;
+      return { nodes: nodes.length, all, places: places.size, low, high, parts, root: nodes[0].count };
     }, spec.cloud_stem);
-    for (const part of found)
-      for (let axis = 0; axis < 3; ++axis) {
-        expect(Math.abs(part.low[axis] - spec.cloud_box[0][axis]) < 0.05 && Math.abs(part.high[axis] - spec.cloud_box[1][axis]) < 0.05, `a chunk does not span the cloud: ${JSON.stringify(part)}`);
-        expect(Math.abs(part.share - 0.75) < 0.01, `a chunk is no even sample: ${part.share}`);
-      }
-    expect(found[0].count === 100000, `${found[0].count} points in the first chunk`);
+    expect(found.nodes > 1 && found.root < 100000, `${found.nodes} nodes, ${found.root} points in the root`);
+    expect(found.all === 110000 && found.places > 109500, `${found.all} points, ${found.places} places`);
+    for (let axis = 0; axis < 3; ++axis)
+      expect(Math.abs(found.low[axis] - spec.cloud_box[0][axis]) < 0.05 && Math.abs(found.high[axis] - spec.cloud_box[1][axis]) < 0.05, `the root does not span the cloud: ${JSON.stringify(found)}`);
+    for (const part of found.parts) expect(Math.abs(part / found.root - 0.25) < 0.01, `the root is no even sample: ${found.parts}`);
+  });
+
+  await check("nodes by need", async (open_page) => {
+    const page = await open_page(cloud);
+    const in_view = () => page.evaluate(() => scanshade.shown_chunks().reduce((sum, chunk) => sum + chunk.count, 0));
+    const rests = async () => {
+      await pause(page, 300);
+      await page.waitForFunction(() => document.querySelector("#point-canvas").dataset.loaded && !/loading/.test(document.querySelector("#point-readout").textContent), null, { timeout: 20000 });
+      await pause(page, 100);
+    };
+    await points_of(page);
+    await rests();
+    // What is drawn has each place once, in parts that cover each chunk, and as fine as the screen shows.
+    const parts = await page.evaluate(() => scanshade.shown_chunks().map(({ count, ranges }) => [count, ranges.reduce((sum, each) => (each.first === sum ? sum + each.count : NaN), 0)]));
+    for (const [count, covered] of parts) expect(count === covered, `${covered} of ${count} points of a chunk are drawn`);
+    const asked = () => page.asked.filter((url) => url.includes("/points/")).length;
+    await page.focus("#point-canvas");
+    for (let i = 0; i < 8; ++i) await page.keyboard.press("+");
+    await rests();
+    const near = await in_view();
+    for (let i = 0; i < 36; ++i) await page.keyboard.press("-");
+    await rests();
+    const far = await in_view(), loads = asked();
+    expect(far < near && far < 110000, `${far} points from afar, ${near} from near`);
+    expect((await page.textContent("#point-readout")).endsWith(`${far.toLocaleString("en")} in this view`), await page.textContent("#point-readout"));
+    for (let i = 0; i < 28; ++i) await page.keyboard.press("+");
+    await rests();
+    expect((await in_view()) > far, "coming back loads nothing");
+    expect(asked() === loads, "what is kept is loaded again");
+    expect(new Set(page.asked).size === page.asked.length, "a file was loaded twice");
+    expect(page.complaints.length === 0, page.complaints.join());
   });
 
   await check("map coordinates", async (open_page) => {

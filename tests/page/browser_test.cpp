@@ -259,8 +259,11 @@ TEST_F(BrowserTest, points_seen_from_the_frames_camera_lie_on_its_picture) {
 TEST_F(BrowserTest, the_view_flies_to_the_camera_of_the_chosen_frame_and_turns_by_hand) {
     EXPECT_EQ(found("flight to a frame's camera"), "");
 }
-TEST_F(BrowserTest, each_chunk_of_a_cloud_is_an_even_sample_and_strays_are_counted) {
+TEST_F(BrowserTest, all_nodes_are_the_cloud_the_root_an_even_sample_and_strays_are_counted) {
     EXPECT_EQ(found("points of a cloud"), "");
+}
+TEST_F(BrowserTest, nodes_of_a_cloud_are_loaded_and_drawn_as_the_view_needs_them) {
+    EXPECT_EQ(found("nodes by need"), "");
 }
 TEST_F(BrowserTest, map_coordinates_are_drawn_as_those_round_the_origin) { EXPECT_EQ(found("map coordinates"), ""); }
 TEST_F(BrowserTest, tiles_of_a_capture_lie_side_by_side) { EXPECT_EQ(found("tiles"), ""); }

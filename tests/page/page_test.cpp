@@ -9,6 +9,7 @@
 #include "io/captures/capture.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/number_fields.h"
+#include "io/compression/inflate.h"
 #include "tests/support/files.h"
 #include "tests/support/points.h"
 #include "tests/support/says.h"
@@ -16,6 +17,7 @@
 #include "tests/support/tile.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -84,17 +86,26 @@ TEST(PreviewTest, maps_without_any_value_are_no_error) {
 
 // ---------------------------------------------------------------------------------------------------- points
 
+/// What a script of points holds.
+nlohmann::json chunk_in(const fs::path& file) {
+    const std::string text = read_bytes(file), call = "scanshade.points(";
+    EXPECT_TRUE(text.starts_with(call) && text.ends_with(")\n"));
+    return nlohmann::json::parse(text.substr(call.size(), text.size() - call.size() - 2));
+}
+
 TEST(PagePointsTest, no_more_points_are_written_than_asked_for_and_the_page_knows_of_the_rest) {
     const TemporaryFolder folder;
     const tests::Points points = tests::square(30000);
     const std::vector<float> ao(points.size(), 0.5F);
     const auto files = page::write_points(folder.path(), "points/a", {.points = points, .visibility = ao}, 10000);
     ASSERT_EQ(files, std::vector<fs::path>{"points/a.000.js"});
-    const std::string script = read_bytes(folder / files[0]);
-    for (const char* part : {"\"count\":10000", "\"total\":10000", "\"of\":30000", "\"left_out\":0"})
-        EXPECT_TRUE(says(script.substr(0, 400), part));
+    const nlohmann::json chunk = chunk_in(folder / files[0]), facts = chunk["facts"];
+    EXPECT_EQ(chunk["count"], 10000);
+    EXPECT_EQ(facts["total"], 10000);
+    EXPECT_EQ(facts["of"], 30000);
+    EXPECT_EQ(facts["left_out"], 0);
     (void)page::write_points(folder.path(), "b", {.points = points, .visibility = ao}, 10000);
-    EXPECT_EQ(read_bytes(folder / "b.000.js"), script) << "equal clouds, equal bytes";
+    EXPECT_EQ(read_bytes(folder / "b.000.js"), read_bytes(folder / files[0])) << "equal clouds, equal bytes";
 }
 
 TEST(PagePointsTest, clouds_without_extent_or_points_are_no_error) {
@@ -108,13 +119,6 @@ TEST(PagePointsTest, clouds_without_extent_or_points_are_no_error) {
         EXPECT_TRUE(
             says(read_bytes(folder / (std::string(name) + ".000.js")), fmt::format("\"count\":{}", points.size())));
     }
-}
-
-/// What a script of points holds.
-nlohmann::json chunk_in(const fs::path& file) {
-    const std::string text = read_bytes(file), call = "scanshade.points(";
-    EXPECT_TRUE(text.starts_with(call) && text.ends_with(")\n"));
-    return nlohmann::json::parse(text.substr(call.size(), text.size() - call.size() - 2));
 }
 
 TEST(PagePointsTest, fields_have_steps_that_keep_integers_and_names_that_end_no_script) {
@@ -135,11 +139,16 @@ TEST(PagePointsTest, fields_have_steps_that_keep_integers_and_names_that_end_no_
         10000);
     EXPECT_EQ(read_bytes(folder / "a.000.js").find('<'), std::string::npos);
     const auto chunk = chunk_in(folder / "a.000.js");
-    const auto fields = chunk["fields"], codes = chunk["codes"];
+    const auto fields = chunk["facts"]["fields"], codes = chunk["codes"];
     ASSERT_EQ(fields.size(), 4u) << "a field without any value is left out";
     ASSERT_EQ(codes.size(), 4u);
-    EXPECT_EQ(fields[0],
-              nlohmann::json({{"name", "</script><b>"}, {"low", 0}, {"high", 6}, {"step", 1}, {"whole", true}}));
+    nlohmann::json counts = nlohmann::json::array();
+    for (int value = 0; value < 7; ++value)
+        counts.push_back({value, value < 6 ? 143 : 142});
+    EXPECT_EQ(
+        fields[0],
+        nlohmann::json(
+            {{"name", "</script><b>"}, {"low", 0}, {"high", 6}, {"step", 1}, {"whole", true}, {"counts", counts}}));
     EXPECT_NEAR(fields[1]["step"].get<double>(), 999.0 / 65534, 1e-9);
     EXPECT_EQ(codes[2], "") << "a constant needs no codes";
     EXPECT_GT(fields[3]["step"].get<double>(), 1) << "integers of a wide range are rounded";
@@ -157,8 +166,161 @@ TEST(PagePointsTest, more_fields_than_are_shown_are_counted) {
          .read = [](std::size_t i, std::span<double> values) { std::ranges::fill(values, static_cast<double>(i)); }},
         10000);
     const auto chunk = chunk_in(folder / "a.000.js");
-    EXPECT_EQ(chunk["fields"].size(), page::most_fields);
-    EXPECT_EQ(chunk["more_fields"], 5);
+    EXPECT_EQ(chunk["facts"]["fields"].size(), page::most_fields);
+    EXPECT_EQ(chunk["facts"]["more_fields"], 5);
+}
+
+/// What packed() packed.
+std::string unpacked(const std::string& base64) {
+    const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string bytes;
+    std::uint32_t bits = 0, count = 0;
+    for (const char digit : base64.substr(0, base64.find('='))) {
+        bits = bits << 6 | static_cast<std::uint32_t>(digits.find(digit));
+        if ((count += 6) >= 8)
+            bytes += static_cast<char>(bits >> (count -= 8));
+    }
+    return inflated(bytes, Inflate::zlib, 1 << 26);
+}
+
+/// Numbers of planes of folded differences.
+std::vector<std::uint32_t> numbers_in(const std::string& bytes, std::size_t at, std::size_t count, std::size_t planes) {
+    std::vector<std::uint32_t> numbers(count);
+    std::uint32_t before = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        std::uint32_t folded = 0;
+        for (std::size_t plane = 0; plane < planes; ++plane)
+            folded |= std::uint32_t(static_cast<unsigned char>(bytes.at(at + plane * count + i))) << (8 * plane);
+        before += folded & 1U ? ~(folded >> 1) : folded >> 1;
+        numbers[i] = before &= (1U << (8 * planes)) - 1;
+    }
+    return numbers;
+}
+
+/// A cloud as a page reads it: of each node its level, box, the places of its points, and their numbers in the cloud.
+struct ReadNode {
+    int level = 0;
+    Eigen::Vector3d low = Eigen::Vector3d::Zero();
+    double edge = 0, step = 0, spacing = 0;
+    tests::Points points;
+    std::vector<std::size_t> numbers;
+};
+
+std::vector<ReadNode> read_octree(const fs::path& folder, const std::string& stem) {
+    const auto facts = chunk_in(folder / (stem + ".000.js"))["facts"];
+    const auto cube = facts["cube"].get<std::array<double, 4>>();
+    std::vector<ReadNode> nodes;
+    for (std::size_t part = 0; part < facts["tree"].size(); ++part) {
+        const auto& [parent, octant, count, spacing] = facts["tree"][part].get<std::array<double, 4>>();
+        ReadNode node;
+        node.spacing = spacing;
+        node.low = {cube[0], cube[1], cube[2]};
+        node.edge = cube[3];
+        if (part > 0) {
+            const ReadNode& above = nodes.at(static_cast<std::size_t>(parent));
+            node.level = above.level + 1;
+            node.edge = above.edge / 2;
+            for (int axis = 0; axis < 3; ++axis)
+                node.low[axis] = above.low[axis] + (static_cast<int>(octant) >> axis & 1) * node.edge;
+        }
+        const auto chunk = chunk_in(folder / fmt::format("{}.{:03}.js", stem, part));
+        const int bits = chunk["bits"];
+        const auto size = chunk["count"].get<std::size_t>(), planes = std::size_t(bits > 16 ? 3 : 2);
+        EXPECT_EQ(static_cast<double>(size), count);
+        node.step = node.edge / std::exp2(bits);
+        const std::string bytes = unpacked(chunk["positions"]);
+        node.points.resize(size);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const std::vector<std::uint32_t> codes = numbers_in(bytes, axis * planes * size, size, planes);
+            for (std::size_t i = 0; i < size; ++i) {
+                EXPECT_LT(codes[i], 1U << bits);
+                const auto along = static_cast<Eigen::Index>(axis);
+                node.points[i][along] = node.low[along] + (codes[i] + 0.5) * node.step;
+            }
+        }
+        const auto low = numbers_in(unpacked(chunk["codes"][0]), 0, size, 2),
+                   high = numbers_in(unpacked(chunk["codes"][1]), 0, size, 2);
+        for (std::size_t i = 0; i < size; ++i)
+            node.numbers.push_back((low[i] - 1) + 1000 * std::size_t(high[i] - 1));
+        nodes.push_back(node);
+    }
+    return nodes;
+}
+
+std::vector<ReadNode> written_octree(const tests::Points& points, std::size_t most = 1 << 30) {
+    const TemporaryFolder folder;
+    (void)page::write_points(folder.path(), "a",
+                             {.points = points,
+                              .fields = {{"low", true}, {"high", true}},
+                              .read =
+                                  [](std::size_t i, std::span<double> values) {
+                                      values[0] = static_cast<double>(i % 1000);
+                                      values[1] = static_cast<double>(i / 1000);
+                                  }},
+                             most);
+    return read_octree(folder.path(), "a");
+}
+
+TEST(PagePointsTest, every_point_is_in_one_node_and_where_it_was_to_half_a_step) {
+    // A floor and a wall, and a dense spot, which makes the octree deep.
+    tests::Points points = tests::corner(300000);
+    tests::Dice dice;
+    for (int i = 0; i < 300000; ++i)
+        points.emplace_back(0.7 + 0.01 * dice.roll(), 0.3 + 0.01 * dice.roll(), 0.001 * dice.roll());
+    const auto nodes = written_octree(points);
+    ASSERT_GT(nodes.size(), 8u);
+    std::vector<int> seen(points.size());
+    for (const ReadNode& node : nodes) {
+        EXPECT_NEAR(node.step, nodes[0].step, 1e-12) << "all nodes have the same steps";
+        for (std::size_t i = 0; i < node.points.size(); ++i) {
+            ++seen.at(node.numbers[i]);
+            const Eigen::Vector3d off = node.points[i] - points[node.numbers[i]];
+            ASSERT_LT(off.cwiseAbs().maxCoeff(), 0.5001 * node.step) << "level " << node.level;
+        }
+    }
+    EXPECT_TRUE(std::ranges::all_of(seen, [](int times) { return times == 1; }));
+    EXPECT_GT(nodes.back().level, 5);
+    EXPECT_LT(nodes[0].step, 2.0 / 65536 / 20) << "the deeper the octree, the finer the steps";
+}
+
+TEST(PagePointsTest, a_node_and_those_above_it_are_an_even_sample_of_its_box) {
+    const auto nodes = written_octree(tests::corner(900000, 1e-4));
+    ASSERT_GT(nodes.size(), 4u);
+    const ReadNode& root = nodes[0];
+    // Twelve parts of equal area have equal shares: a random sample's would differ by 2 %, a grid's by a row of cells
+    // in 43.
+    std::array<int, 12> parts{};
+    for (const Eigen::Vector3d& p : root.points)
+        ++parts.at(static_cast<std::size_t>(6 * (p.x() > 0.01) + 3 * (p.y() > 1) +
+                                            std::min(2.0, std::floor(1.5 * std::max(p.x(), p.z())))));
+    for (const int part : parts)
+        EXPECT_NEAR(part, static_cast<double>(root.points.size()) / 12,
+                    0.06 * static_cast<double>(root.points.size()) / 12);
+    for (const ReadNode& node : nodes) {
+        EXPECT_LT(node.points.size(), 160000u);
+        EXPECT_LE(node.spacing, root.spacing);
+        for (const Eigen::Vector3d& p : node.points)
+            ASSERT_TRUE(((p - node.low).array() >= 0).all() && ((p - node.low).array() <= node.edge).all());
+    }
+}
+
+TEST(PagePointsTest, copies_of_one_point_end_in_one_node) {
+    const auto nodes = written_octree(tests::Points(250000, {1, 2, 3}));
+    std::size_t all = 0;
+    for (const ReadNode& node : nodes)
+        all += node.points.size();
+    EXPECT_EQ(all, 250000u);
+    EXPECT_EQ(nodes[0].points[0], Eigen::Vector3d(1, 2, 3));
+}
+
+TEST(PagePointsTest, a_sample_of_many_points_is_written_once_each) {
+    const auto nodes = written_octree(tests::corner(400000), 150000);
+    std::vector<std::size_t> all;
+    for (const ReadNode& node : nodes)
+        all.insert(all.end(), node.numbers.begin(), node.numbers.end());
+    EXPECT_EQ(all.size(), 150000u);
+    std::ranges::sort(all);
+    EXPECT_EQ(std::ranges::adjacent_find(all), all.end());
 }
 
 /// The numbers of a point by their names.
@@ -262,13 +424,34 @@ TEST_F(PageFilesTest, a_page_runs_its_own_scripts_and_those_of_its_folder_only) 
     EXPECT_TRUE(says(policy, "default-src 'none'"));
     EXPECT_FALSE(says(policy, "unsafe"));
     const auto scripts = between(html, "script"), styles = between(html, "style");
-    EXPECT_EQ(scripts.size(), 17u);
+    EXPECT_EQ(scripts.size(), 18u);
     EXPECT_EQ(styles.size(), 1u);
     std::size_t hashes = 0;
     for (std::size_t each = policy.find("'sha256-"); each != std::string::npos;
          each = policy.find("'sha256-", each + 1))
         ++hashes;
     EXPECT_EQ(hashes, scripts.size() + styles.size()); // browser_test sees that they are the right ones
+}
+
+TEST_F(PageFilesTest, a_clouds_page_has_as_many_points_as_asked_for_or_all) {
+    write_new_ply(folder / "a.ply", tests::corner(3000), {}, {});
+    const auto run_with = [&](const std::string& points) {
+        return run_program(
+            fmt::format("run '{0}/a.ply' -o '{0}/out' --overwrite --clouds points --cloud.rays 1 --page-points {1}",
+                        folder.path().string(), points));
+    };
+    for (const auto& [asked, written] : {std::pair("1000", 1000), std::pair("all", 3000), std::pair("1000000", 3000)}) {
+        ASSERT_NE(run_with(asked).exit_code, 1);
+        const nlohmann::json facts = chunk_in(out() / "points/a.000.js")["facts"];
+        EXPECT_EQ(facts["total"], written) << asked;
+        EXPECT_EQ(facts["of"], 3000);
+    }
+    for (const char* wrong : {"999", "some", "1e6", "-5", "2000x"}) {
+        const Ran ran = run_with(wrong);
+        EXPECT_EQ(ran.exit_code, 1);
+        EXPECT_TRUE(
+            says(ran.err, fmt::format("page-points: '{}' given, expected all or a number from 1000 on", wrong)));
+    }
 }
 
 TEST_F(PageFilesTest, without_a_page_nothing_of_it_is_written) {
