@@ -21,7 +21,8 @@ namespace {
 using Eigen::Isometry3d, Eigen::Matrix3d, Eigen::Vector2d, Eigen::Vector3d;
 using Points = std::span<const Vector3d>;
 
-constexpr double pixel_tolerance = 0.2; ///< of a pixel; a fifth, as pixel_cloud() has it
+constexpr double pixel_tolerance = 0.2;       ///< of a pixel; a fifth, as pixel_cloud() has it
+constexpr std::size_t enough_of_frame = 4000; ///< points that tell its camera
 
 /// Points one after the other, of one row or a piece of one, and the plane that they lie in.
 struct Row {
@@ -447,57 +448,84 @@ std::optional<View> first_view(const Core& core, Points points, double grain) {
     return view;
 }
 
-/// Turns, moves and stretches a view so that points are on whole pixels, by least squares (Gauss-Newton). Rays do not
-/// tell depth, so noise along them does not matter. Returns the share of the points that are.
-double refine(View& view, Points points, double grain, int rounds, std::size_t enough) {
-    constexpr double tolerance = 0.4; ///< of a pixel: those in another pixel are left out
+/// What turns, moves (6 numbers) and stretches (4) a view so that points are on whole pixels, by least squares. Rays do
+/// not tell depth, so noise along them does not matter.
+struct Equations {
+    Eigen::Matrix<double, 10, 10> normal = Eigen::Matrix<double, 10, 10>::Zero();
+    Eigen::Matrix<double, 10, 1> right = Eigen::Matrix<double, 10, 1>::Zero();
+    std::size_t fitting = 0, asked = 0;
+    double squares = 0; ///< of the weighted residuals
+
+    [[nodiscard]] double share() const {
+        return static_cast<double>(fitting) / static_cast<double>(std::max<std::size_t>(asked, 1));
+    }
+    void add(const View& view, const Vector3d& point, double grain) {
+        constexpr double tolerance = 0.4; // of a pixel: those in another pixel are left out
+        ++asked;
+        const Vector3d p = view.seen(point);
+        if (!(p.z() > 0))
+            return;
+        const Vector2d at = view.pixel(p), off = at - at.array().round().matrix();
+        if (!(off.cwiseAbs().maxCoeff() < tolerance))
+            return;
+        ++fitting;
+        Eigen::Matrix<double, 2, 3> by_point;
+        by_point << view.fx / p.z(), 0, -view.fx * p.x() / (p.z() * p.z()), 0, view.fy / p.z(),
+            -view.fy * p.y() / (p.z() * p.z());
+        Matrix3d turned;
+        turned << 0, -p.z(), p.y(), p.z(), 0, -p.x(), -p.y(), p.x(), 0;
+        Eigen::Matrix<double, 2, 10> by;
+        by << by_point * turned, -by_point, Eigen::Matrix<double, 2, 4>::Zero();
+        by(0, 6) = p.x() / p.z();
+        by(1, 7) = p.y() / p.z();
+        by(0, 8) = by(1, 9) = 1;
+        const double weight = 1 / (1e-4 + std::pow(view.fx * grain / p.z(), 2));
+        normal += weight * by.transpose() * by;
+        right -= weight * by.transpose() * off;
+        squares += weight * off.squaredNorm();
+    }
+};
+
+Equations equations_of(const View& view, Points points, double grain, std::size_t enough) {
+    Equations all;
     const std::size_t step = std::max<std::size_t>(1, points.size() / enough);
-    using Matrix = Eigen::Matrix<double, 10, 10>;
-    using Row10 = Eigen::Matrix<double, 2, 10>;
+    for (std::size_t i = 0; i < points.size(); i += step)
+        all.add(view, points[i], grain);
+    all.normal.diagonal() *= 1 + 1e-9;
+    return all;
+}
+
+void turn_and_move(View& view, const Eigen::Matrix<double, 6, 1>& by) {
+    const Vector3d turn = by.head<3>();
+    if (turn.norm() > 0)
+        view.world_from_camera.linear() =
+            view.world_from_camera.linear() * Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+    view.world_from_camera.translation() += view.world_from_camera.linear() * by.tail<3>();
+}
+
+/// Focal lengths and principal point.
+using Intrinsics = Eigen::Vector4d;
+Intrinsics intrinsics_of(const View& view) { return {view.fx, view.fy, view.cx, view.cy}; }
+void set_intrinsics(View& view, const Intrinsics& numbers) {
+    view.fx = numbers[0];
+    view.fy = numbers[1];
+    view.cx = numbers[2];
+    view.cy = numbers[3];
+}
+
+/// Fits a view to its points (Gauss-Newton). Returns the share of the points that are on whole pixels.
+double refine(View& view, Points points, double grain, int rounds, std::size_t enough) {
     double share = 0;
     for (int round = 0; round < rounds; ++round) {
-        Matrix normal = Matrix::Zero();
-        Eigen::Matrix<double, 10, 1> right = Eigen::Matrix<double, 10, 1>::Zero();
-        std::size_t fitting = 0, asked = 0;
-        for (std::size_t i = 0; i < points.size(); i += step) {
-            ++asked;
-            const Vector3d p = view.seen(points[i]);
-            if (!(p.z() > 0))
-                continue;
-            const Vector2d at = view.pixel(p), off = at - at.array().round().matrix();
-            if (!(off.cwiseAbs().maxCoeff() < tolerance))
-                continue;
-            ++fitting;
-            Eigen::Matrix<double, 2, 3> by_point;
-            by_point << view.fx / p.z(), 0, -view.fx * p.x() / (p.z() * p.z()), 0, view.fy / p.z(),
-                -view.fy * p.y() / (p.z() * p.z());
-            Matrix3d turned;
-            turned << 0, -p.z(), p.y(), p.z(), 0, -p.x(), -p.y(), p.x(), 0;
-            Row10 by;
-            by << by_point * turned, -by_point, Eigen::Matrix<double, 2, 4>::Zero();
-            by(0, 6) = p.x() / p.z();
-            by(1, 7) = p.y() / p.z();
-            by(0, 8) = by(1, 9) = 1;
-            const double weight = 1 / (1e-4 + std::pow(view.fx * grain / p.z(), 2));
-            normal += weight * by.transpose() * by;
-            right -= weight * by.transpose() * off;
-        }
-        share = static_cast<double>(fitting) / static_cast<double>(std::max<std::size_t>(asked, 1));
-        if (fitting < 50)
+        const Equations equations = equations_of(view, points, grain, enough);
+        share = equations.share();
+        if (equations.fitting < 50)
             return 0;
-        normal.diagonal() *= 1 + 1e-9;
-        const Eigen::Matrix<double, 10, 1> by = normal.ldlt().solve(right);
+        const Eigen::Matrix<double, 10, 1> by = equations.normal.ldlt().solve(equations.right);
         if (!by.allFinite())
             return 0;
-        const Vector3d turn = by.head<3>();
-        if (turn.norm() > 0)
-            view.world_from_camera.linear() =
-                view.world_from_camera.linear() * Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
-        view.world_from_camera.translation() += view.world_from_camera.linear() * by.segment<3>(3);
-        view.fx += by[6];
-        view.fy += by[7];
-        view.cx += by[8];
-        view.cy += by[9];
+        turn_and_move(view, by.head<6>());
+        set_intrinsics(view, intrinsics_of(view) + by.tail<4>());
     }
     return share;
 }
@@ -544,7 +572,8 @@ std::optional<Found> grown(View view, Points points, Range core, std::size_t fre
             reached(view, points, range.last, std::min(points.size(), range.last + margin), true)};
         const bool stays = wider.size() == range.size();
         range = wider;
-        if (refine(view, points.subspan(range.first, range.size()), grain, 2, stays ? 4000 : 600) < least_share)
+        if (refine(view, points.subspan(range.first, range.size()), grain, 2, stays ? enough_of_frame : 600) <
+            least_share)
             return std::nullopt;
         if (stays)
             break;
@@ -594,6 +623,89 @@ std::vector<Found> all_frames(Points points, double grain) {
         }
     }
     return found;
+}
+
+// ------------------------------------------------------------------------------------ one camera of several frames
+
+/// What a frame's points say of its camera's intrinsics, whatever its pose: normal equations without the pose (its
+/// Schur complement), in units of the points' own errors.
+struct KnownIntrinsics {
+    Intrinsics numbers;
+    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
+
+    /// Both together.
+    [[nodiscard]] KnownIntrinsics with(const KnownIntrinsics& other) const {
+        const Eigen::Matrix4d sum = information + other.information;
+        return {sum.ldlt().solve(information * numbers + other.information * other.numbers), sum};
+    }
+    /// By how many standard deviations both differ.
+    [[nodiscard]] double differs(const KnownIntrinsics& other) const {
+        const Intrinsics by = numbers - other.numbers;
+        const Intrinsics weighted =
+            information * (information + other.information).ldlt().solve(other.information * by);
+        return std::sqrt(std::max(0.0, by.dot(weighted)));
+    }
+};
+
+KnownIntrinsics known_intrinsics(const Found& frame, Points points, double grain) {
+    const Equations all =
+        equations_of(frame.view, points.subspan(frame.range.first, frame.range.size()), grain, enough_of_frame);
+    const double variance =
+        std::max(all.squares / static_cast<double>(std::max<std::size_t>(2 * all.fitting, 1)), 1e-12);
+    const auto of_pose = all.normal.topLeftCorner<6, 6>();
+    const auto both = all.normal.bottomLeftCorner<4, 6>();
+    const Eigen::Matrix4d left = all.normal.bottomRightCorner<4, 4>() - both * of_pose.ldlt().solve(both.transpose());
+    return {intrinsics_of(frame.view), left / variance};
+}
+
+/// Fits the pose alone. Returns the share of the points that are on whole pixels.
+double refine_pose(View& view, Points points, double grain) {
+    constexpr int rounds = 3;
+    double share = 0;
+    for (int round = 0; round < rounds; ++round) {
+        const Equations equations = equations_of(view, points, grain, enough_of_frame);
+        share = equations.share();
+        const Eigen::Matrix<double, 6, 6> of_pose = equations.normal.topLeftCorner<6, 6>();
+        const Eigen::Matrix<double, 6, 1> by = of_pose.ldlt().solve(equations.right.head<6>());
+        if (!by.allFinite())
+            return 0;
+        turn_and_move(view, by);
+    }
+    return share;
+}
+
+/// Frames of one camera get one: those whose intrinsics differ by no more than their errors. Several cameras in turn
+/// stay several. The principal point is known up to whole pixels, and those of the first frame that fits are taken.
+void share_cameras(std::vector<Found>& found, Points points, double grain) {
+    constexpr double alike = 8, loss = 0.002;
+    struct Group {
+        KnownIntrinsics camera;
+        std::vector<std::size_t> frames;
+    };
+    std::vector<Group> groups;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+        KnownIntrinsics own = known_intrinsics(found[i], points, grain);
+        const auto group = std::ranges::find_if(groups, [&](const Group& each) {
+            for (Eigen::Index k = 2; k < 4; ++k)
+                own.numbers[k] -= std::round(own.numbers[k] - each.camera.numbers[k]);
+            return own.differs(each.camera) < alike;
+        });
+        if (group == groups.end()) {
+            groups.push_back({own, {i}});
+            continue;
+        }
+        group->camera = group->camera.with(own);
+        group->frames.push_back(i);
+    }
+    for (const Group& group : groups)
+        for (const std::size_t i : group.frames) {
+            const Points own = points.subspan(found[i].range.first, found[i].range.size());
+            View shared = found[i].view;
+            set_intrinsics(shared, group.camera.numbers);
+            if (refine_pose(shared, own, grain) >=
+                equations_of(found[i].view, own, grain, enough_of_frame).share() - loss)
+                found[i].view = shared;
+        }
 }
 
 constexpr std::size_t fewest_of_frame = 1000; ///< points that are looked at
@@ -730,6 +842,7 @@ std::optional<FoundFrames> found_frames(Points points) {
     std::vector<Found> found = all_frames(finite, all.grain);
     if (found.empty())
         return std::nullopt;
+    share_cameras(found, finite, all.grain);
     const Grid grid = common_grid(found, finite);
     const cv::Size size = grid.size();
     const double pixels = static_cast<double>(size.width) * size.height * static_cast<double>(found.size());

@@ -159,6 +159,38 @@ TEST(FoundFrames, coordinates_rounded_to_a_tenth_of_a_millimetre_or_to_one_do) {
     }
 }
 
+TEST(FoundFrames, frames_of_one_camera_get_one) {
+    for (const double step : {0.0, 2e-4}) {
+        Merged made = merged({.frames = 6});
+        for (Vector3d& point : made.points)
+            if (step > 0)
+                point = (point / step).array().round().matrix() * step;
+        const std::optional<FoundFrames> found = found_frames(made.points);
+        ASSERT_TRUE(found);
+        ASSERT_EQ(found->frames.size(), 6U);
+        for (const FoundFrame& frame : found->frames)
+            EXPECT_EQ(frame.camera, found->frames.front().camera);
+        EXPECT_NEAR(found->frames.front().camera.fx, camera.fx, step > 0 ? 5e-3 : 1e-5);
+        EXPECT_NEAR(found->frames.front().camera.fy, camera.fy, step > 0 ? 5e-3 : 1e-5);
+    }
+}
+
+TEST(FoundFrames, two_cameras_in_turn_stay_two) {
+    Pinhole second = camera;
+    second.fx *= 1.002;
+    second.cy += 0.3;
+    const std::optional<FoundFrames> found = found_frames(merged({.frames = 6, .in_turn = {camera, second}}).points);
+    ASSERT_TRUE(found);
+    ASSERT_EQ(found->frames.size(), 6U);
+    EXPECT_GT(found->share, 0.999);
+    for (std::size_t i = 0; i < 6; ++i) {
+        EXPECT_EQ(found->frames[i].camera, found->frames[i % 2].camera);
+        EXPECT_NEAR(found->frames[i].camera.fx, i % 2 == 0 ? camera.fx : second.fx, 1e-5);
+        EXPECT_NEAR(found->frames[i].camera.fy, camera.fy, 1e-5);
+    }
+    EXPECT_NEAR(found->frames[1].camera.cy - found->frames[0].camera.cy, 0.3, 1e-4);
+}
+
 TEST(FoundFrames, of_known_cameras_any_points_show_their_pixels) {
     const Merged made = merged({.frames = 3});
     std::vector<FoundFrame> known;
