@@ -195,7 +195,9 @@ std::string damage(const fs::path& folder, const std::string& bytes) {
     }
     EXPECT_TRUE(says(refusal, cloud.records->octree_damage)) << refusal;
     EXPECT_TRUE(says(refusal, "--copc no")) << refusal;
-    EXPECT_TRUE(open_capture(file, {.copc = false}).load(0).cloud->records->octree.empty());
+    CaptureOptions as_laz;
+    as_laz.copc = false;
+    EXPECT_TRUE(open_capture(file, as_laz).load(0).cloud->records->octree.empty());
     const std::string plain = written(folder, file, {"ambient_occlusion"});
     EXPECT_EQ(plain.find("copc"), std::string::npos) << "an octree that points nowhere";
     EXPECT_EQ(plain.substr(load<std::uint64_t>(plain.data() + evlrs_at) + 60, 4), "kept");
