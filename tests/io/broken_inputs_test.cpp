@@ -181,7 +181,7 @@ TEST_F(BrokenClouds, pcd_headers_are_checked_line_by_line) {
     EXPECT_TRUE(says(with("DATA ascii\n", ""), "no DATA line"));
     EXPECT_TRUE(says(with("DATA ascii", "DATA base64"), "line 9: DATA \"base64\""));
     EXPECT_TRUE(says(with("HEIGHT 1", "POINTS 2"), "second time"));
-    EXPECT_TRUE(says(cloud_refusal("hello"), "begins with \"hell\": neither PLY, LAZ, LAS"));
+    EXPECT_TRUE(says(cloud_refusal("hello"), "begins with \"hell\": neither packed PLY, PLY, LAZ, LAS"));
     EXPECT_TRUE(says(cloud_refusal(""), "empty file"));
 }
 
