@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstdint>
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 #include <unordered_set>
 
 namespace scanshade {

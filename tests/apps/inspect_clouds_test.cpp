@@ -45,8 +45,10 @@ std::string las(const std::string& reference) {
 
 std::string lines_of(const char* head, const char* tail) {
     std::string text = head;
-    for (int i = 0; i < side * side; ++i)
-        text += fmt::format("{} {} {}{}\n", 0.5 * (i % side), 0.5 * (i / side), 0.01 * (i % 7), tail);
+    for (int i = 0; i < side * side; ++i) {
+        const int row = i / side;
+        text += fmt::format("{} {} {}{}\n", 0.5 * (i % side), 0.5 * row, 0.01 * (i % 7), tail);
+    }
     return text;
 }
 

@@ -502,8 +502,8 @@ FittedCloud cleaned(const LocalCloud& local, std::span<const Vector3d> points, s
     FittedCloud cloud = cleaned_cloud(local, points, {}, radius, grid);
     std::vector<int> votes(cloud.points.size());
     for (std::size_t i = 0; i < cloud.fitted_of.size(); ++i)
-        if (is_direction(normals[i]))
-            votes[cloud.fitted_of[i]] += normals[i].dot(cloud.axes[cloud.fitted_of[i]].cast<double>()) < 0 ? -1 : 1;
+        if (const double side = normals[i].dot(cloud.axes[cloud.fitted_of[i]].cast<double>()); side != 0)
+            votes[cloud.fitted_of[i]] += side < 0 ? -1 : static_cast<int>(side > 0); // NaN: no vote
     for (std::size_t disc = 0; disc < votes.size(); ++disc)
         cloud.normals.push_back((votes[disc] < 0 ? -1 : 1) * cloud.axes[disc].cast<double>());
     return cloud;
