@@ -176,7 +176,7 @@ TEST(Affects, every_flag_has_its_class) {
             if (row.affects != Affects::results) // all others, and every flag of a method, of clouds and of sequences
                 flags[row.affects] += row.name + " ";
     EXPECT_EQ(flags[Affects::as_used],
-              "frames camera colour poses depth-scale registered copc association-limit depth-noise "
+              "frames camera colour poses depth-scale registered association-limit depth-noise "
               "method radius quality max-error max-ms settings ");
     EXPECT_EQ(flags[Affects::outputs], "write format colour-format shade light shade-strength cloud cloud-resolution "
                                        "colour-cloud page page-points tar ");
