@@ -9,9 +9,6 @@
 
 namespace scanshade {
 
-/// Splats below this opacity are haze: trained scenes have them by the thousand in the air. They belong to no surface.
-inline constexpr float haze_opacity = 0.05F;
-
 /// Of `cloud.splats`, one per point. A ray's share of light is the product of 1 - a over the discs that it crosses,
 /// with a = opacity e^(-x^2 / 2) at x sigmas (Kerbl et al. 2023, equation 3, in the disc's plane as in Huang et al.,
 /// "2D Gaussian Splatting", 2024). Visibility is the cosine-weighted mean over the rays. Haze has the visibility of the

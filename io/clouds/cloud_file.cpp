@@ -120,7 +120,7 @@ std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, PointOdditie
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
         Eigen::Vector3d& point = points[i];
         const bool usable = is_usable(point), unwanted = is_left_out(i),
-                   haze = !records.splats.empty() && records.splats[i].opacity < least_opacity;
+                   haze = !records.splats.empty() && records.splats[i].opacity < haze_opacity;
         if (usable && !unwanted && !haze)
             return;
         ++unusable;

@@ -14,8 +14,6 @@
 
 namespace scanshade {
 
-/// Splats less opaque than this show hardly anything; trained ones float by the thousand in the air.
-inline constexpr float least_opacity = 0.05F;
 /// A colour is 0.5 plus this times f_dc: the spherical harmonic of degree 0, 1 / sqrt(4 pi).
 inline constexpr double colour_of_degree_0 = 0.28209479177387814;
 

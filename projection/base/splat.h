@@ -5,6 +5,9 @@
 
 namespace scanshade {
 
+/// Splats below this opacity are haze: trained scenes have them by the thousand in the air. They belong to no surface.
+inline constexpr float haze_opacity = 0.05F;
+
 /// Its covariance is R S^2 R^T with R the rotation and S the sigmas. At a distance of x sigmas from its middle it takes
 /// the share opacity e^(-x^2 / 2) of the light.
 struct Splat {
