@@ -2,6 +2,7 @@
 // rotations and further coefficients, in one gzip or, since version 4, in a frame of Zstandard each.
 #include "io/clouds/packed_splats.h"
 #include "io/clouds/splats.h"
+#include "io/compression/deflate.h"
 #include "io/compression/inflate.h"
 #include "projection/base/error.h"
 
@@ -12,7 +13,6 @@
 #include <limits>
 #include <numbers>
 #include <tbb/parallel_for.h>
-#include <zlib.h>
 #include <zstd.h>
 
 namespace scanshade {
@@ -207,34 +207,6 @@ void shade(Spz& spz, std::span<const float> visibility, double strength) {
     });
 }
 
-std::string gzip_of(std::string_view bytes) {
-    z_stream stream = {};
-    constexpr int with_gzip = MAX_WBITS + 16, memory = 8; // no name and no time in its header
-    if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, with_gzip, memory, Z_DEFAULT_STRATEGY) != Z_OK)
-        throw std::bad_alloc();
-    const struct End {
-        z_stream* stream;
-        ~End() { deflateEnd(stream); }
-    } end{&stream};
-    std::string packed;
-    std::string piece(1 << 20, '\0');
-    constexpr std::size_t at_once = 1 << 30;
-    int status = Z_OK;
-    for (std::size_t at = 0; status != Z_STREAM_END;) {
-        if (stream.avail_in == 0) {
-            const std::size_t take = std::min(at_once, bytes.size() - at);
-            stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data() + at));
-            stream.avail_in = static_cast<uInt>(take);
-            at += take;
-        }
-        stream.next_out = reinterpret_cast<Bytef*>(piece.data());
-        stream.avail_out = static_cast<uInt>(piece.size());
-        status = deflate(&stream, at == bytes.size() ? Z_FINISH : Z_NO_FLUSH);
-        packed.append(piece, 0, piece.size() - stream.avail_out);
-    }
-    return packed;
-}
-
 std::string frame_of(std::string_view bytes) {
     std::string packed(ZSTD_compressBound(bytes.size()), '\0');
     constexpr int level = 9;
@@ -285,7 +257,7 @@ CloudRecords read_spz(std::string_view bytes, const fs::path& file, std::vector<
 std::string shaded_spz(const CloudRecords& records, std::span<const float> visibility, double strength) {
     Spz spz = unpacked(records.packed);
     shade(spz, visibility, strength);
-    return spz.frames.empty() ? gzip_of(spz.body) : with_frames(records.packed, spz);
+    return spz.frames.empty() ? deflated(spz.body, Deflate::gzip) : with_frames(records.packed, spz);
 }
 
 } // namespace scanshade

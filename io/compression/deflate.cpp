@@ -1,4 +1,4 @@
-// zlib streams by ISA-L.
+// Streams by ISA-L.
 //
 // Its levels 1 and 2 are not deterministic: the third byte's slot in their table depends on the address of the stream,
 // because ISA-L 2.30's assembly hashes a register that is not set yet. Sometimes the same bytes were therefore packed
@@ -46,9 +46,9 @@ struct Packer::State {
     }
 };
 
-Packer::Packer() : state_(std::make_unique<State>()) {
+Packer::Packer(Deflate form) : state_(std::make_unique<State>()) {
     isal_deflate_init(&state_->stream);
-    state_->stream.gzip_flag = IGZIP_ZLIB;
+    state_->stream.gzip_flag = form == Deflate::gzip ? IGZIP_GZIP : IGZIP_ZLIB;
 }
 
 Packer::~Packer() = default;
@@ -78,9 +78,13 @@ void Packer::append(std::string_view bytes, bool last, std::string& packed) {
         throw std::runtime_error("bytes could not be packed: ISA-L did not end its stream");
 }
 
-std::string deflated(std::string_view bytes) {
+std::string deflated(std::string_view bytes, Deflate form) {
+    constexpr std::size_t at_once = 1 << 30; // ISA-L counts with 32 bits
     std::string packed;
-    Packer().append(bytes, true, packed);
+    Packer packer(form);
+    for (; bytes.size() > at_once; bytes.remove_prefix(at_once))
+        packer.append(bytes.substr(0, at_once), false, packed);
+    packer.append(bytes, true, packed);
     return packed;
 }
 

@@ -1,4 +1,4 @@
-// zlib streams by ISA-L, as PNG files and pages hold them.
+// Packs deflate by ISA-L: zlib streams, as PNG files and pages hold them, and gzip.
 #pragma once
 
 #include <cstddef>
@@ -9,11 +9,13 @@
 
 namespace scanshade {
 
-/// Packs bytes in pieces into one zlib stream, in a quarter of zlib's time, to the same size. Equal samples and pieces
+enum class Deflate { zlib, gzip };
+
+/// Packs bytes in pieces into one stream, in a quarter of zlib's time, to the same size. Equal samples and pieces
 /// give equal streams.
 class Packer {
   public:
-    Packer();
+    explicit Packer(Deflate form = Deflate::zlib);
     ~Packer();
     Packer(const Packer&) = delete;
     Packer& operator=(const Packer&) = delete;
@@ -29,7 +31,7 @@ class Packer {
     std::unique_ptr<State> state_;
 };
 
-/// All bytes as one zlib stream.
-[[nodiscard]] std::string deflated(std::string_view bytes);
+/// All bytes as one stream; gzip without name and time.
+[[nodiscard]] std::string deflated(std::string_view bytes, Deflate form = Deflate::zlib);
 
 } // namespace scanshade
