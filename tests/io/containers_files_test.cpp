@@ -5,6 +5,7 @@
 #include "io/compression/lzfse.h"
 #include "io/images/image_file.h"
 #include "tests/support/files.h"
+#include "tests/support/packed.h"
 #include "tests/support/raw.h"
 
 #include <cmath>
@@ -18,6 +19,8 @@ namespace scanshade {
 namespace {
 
 namespace fs = std::filesystem;
+constexpr int bare = -15; // deflate without a head
+using tests::packed_by_zlib;
 using tests::raw;
 using tests::refusal;
 using tests::says;
@@ -32,20 +35,6 @@ std::string raw_all(const std::vector<Number>& values) {
     return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Number)};
 }
 
-std::string deflated(const std::string& bytes) {
-    z_stream stream = {};
-    EXPECT_EQ(deflateInit2(&stream, 6, Z_DEFLATED, -15, 8, Z_DEFAULT_STRATEGY), Z_OK);
-    std::string packed(deflateBound(&stream, bytes.size()), '\0');
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-    stream.avail_in = static_cast<uInt>(bytes.size());
-    stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-    stream.avail_out = static_cast<uInt>(packed.size());
-    EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-    packed.resize(stream.total_out);
-    deflateEnd(&stream);
-    return packed;
-}
-
 struct Member {
     std::string name, bytes;
     bool packed = true;
@@ -55,7 +44,7 @@ struct Member {
 std::string zip(const std::vector<Member>& members) {
     std::string file, rows;
     for (const Member& member : members) {
-        const std::string data = member.packed ? deflated(member.bytes) : member.bytes;
+        const std::string data = member.packed ? packed_by_zlib(member.bytes, bare) : member.bytes;
         const auto crc =
             crc32(0, reinterpret_cast<const Bytef*>(member.bytes.data()), static_cast<uInt>(member.bytes.size()));
         const std::size_t ones = 0xffffffff;
@@ -277,7 +266,7 @@ TEST_F(ContainerFiles, parts_of_a_long_stream_are_those_of_the_whole) {
     std::uint32_t random = 1;
     for (char& c : bytes)
         c = static_cast<char>((random = random * 1664525U + 1013904223U) >> 28);
-    const std::string packed = deflated(bytes);
+    const std::string packed = packed_by_zlib(bytes, bare);
     const FileBytes stored(file("long", "before" + packed));
     const InflatedStream stream(stored, 6, packed.size(), bytes.size());
     ASSERT_EQ(stream.size(), bytes.size());
@@ -304,7 +293,7 @@ TEST_F(ContainerFiles, depth_bin_is_one_stream_of_floats) {
     std::vector<float> depth(pixels, 2);
     depth.resize(2 * pixels, 3);
     (void)file("pose_intrinsic_imu.json", one_camera);
-    const std::string packed = deflated(raw_all(depth));
+    const std::string packed = packed_by_zlib(raw_all(depth), bare);
     (void)file("depth.bin", packed);
     const Capture capture = open_capture(folder);
     ASSERT_EQ(capture.entries.size(), 2U);

@@ -2,6 +2,7 @@
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "tests/support/files.h"
+#include "tests/support/packed.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +10,6 @@
 #include <fmt/format.h>
 #include <functional>
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 namespace scanshade {
 namespace {
@@ -74,20 +74,6 @@ std::string packed_ply(int chunks = 1, const std::string& more = "") {
     return bytes + more;
 }
 
-std::string gzip(const std::string& bytes) {
-    z_stream stream = {};
-    EXPECT_EQ(deflateInit2(&stream, 6, Z_DEFLATED, MAX_WBITS + 16, 8, Z_DEFAULT_STRATEGY), Z_OK);
-    std::string packed(deflateBound(&stream, bytes.size()) + 64, '\0');
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-    stream.avail_in = static_cast<uInt>(bytes.size());
-    stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-    stream.avail_out = static_cast<uInt>(packed.size());
-    EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-    packed.resize(stream.total_out);
-    deflateEnd(&stream);
-    return packed;
-}
-
 /// A Zstandard frame of one block as it is.
 std::string stored_frame(const std::string& bytes) {
     std::string frame = "\x28\xb5\x2f\xfd\xa0";
@@ -127,7 +113,7 @@ std::string spz(const SpzParts& parts) {
     if (parts.version < 4 || parts.version > 8) {
         for (const std::string& stream : streams)
             bytes += stream;
-        return gzip(bytes + parts.more);
+        return tests::packed_by_zlib(bytes + parts.more, 31);
     }
     const std::size_t listed = parts.degree == 0 ? 5 : 6;
     bytes.back() = static_cast<char>(listed);
