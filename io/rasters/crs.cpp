@@ -84,22 +84,29 @@ void check(const GeoKeys& keys) {
     }
 }
 
+/// The four numbers of a key whose value lies there, of the keys that the directory counts; null where it has none.
+const std::uint16_t* row_of(const GeoKeys& keys, int key, std::uint16_t where) {
+    const auto& directory = keys.directory;
+    const std::size_t end = directory.size() < 4 ? 0 : std::min(directory.size(), 4 + 4 * std::size_t(directory[3]));
+    for (std::size_t at = 4; at + 3 < end; at += 4)
+        if (directory[at] == key && directory[at + 1] == where)
+            return &directory[at];
+    return nullptr;
+}
+
 /// The double of a key in tag 34736.
 std::optional<double> double_of(const GeoKeys& keys, int key) {
-    for (std::size_t at = 4; at + 3 < keys.directory.size(); at += 4)
-        if (keys.directory[at] == key && keys.directory[at + 1] == in_doubles)
-            return keys.doubles[keys.directory[at + 3]];
-    return std::nullopt;
+    const std::uint16_t* const row = row_of(keys, key, in_doubles);
+    return row && row[3] < keys.doubles.size() ? std::optional(keys.doubles[row[3]]) : std::nullopt;
 }
 
 /// The text of a key in tag 34737, without the bar that ends it.
 std::string text_of(const GeoKeys& keys, int key) {
-    for (std::size_t at = 4; at + 3 < keys.directory.size(); at += 4)
-        if (keys.directory[at] == key && keys.directory[at + 1] == in_ascii) {
-            const std::string text = keys.ascii.substr(keys.directory[at + 3], keys.directory[at + 2]);
-            return text.substr(0, text.find('|'));
-        }
-    return "";
+    const std::uint16_t* const row = row_of(keys, key, in_ascii);
+    if (!row || row[3] >= keys.ascii.size())
+        return "";
+    const std::string text = keys.ascii.substr(row[3], row[2]);
+    return text.substr(0, text.find('|'));
 }
 
 double usable_unit(double metres, const std::string& what) {
@@ -137,10 +144,8 @@ void take_plane_unit(Crs& crs) {
 } // namespace
 
 int value_of(const GeoKeys& keys, int key, int otherwise) {
-    for (std::size_t at = 4; at + 3 < keys.directory.size(); at += 4)
-        if (keys.directory[at] == key && keys.directory[at + 1] == here)
-            return keys.directory[at + 3];
-    return otherwise;
+    const std::uint16_t* const row = row_of(keys, key, here);
+    return row ? row[3] : otherwise;
 }
 
 GeoKeys with_value(GeoKeys keys, int key, int value) {

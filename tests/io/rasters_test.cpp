@@ -502,6 +502,15 @@ TEST(Rasters, systems_have_the_names_that_files_give) {
     EXPECT_EQ(crs_of_text(R"(GEOGCS["WGS 84",UNIT["degree",0.0174],AUTHORITY["EPSG","4326"]])").name, "WGS 84");
 }
 
+TEST(Rasters, keys_that_are_not_counted_or_name_nothing_are_none) {
+    // 3073 is beyond the count and beyond the text; 1026 begins where the text ends, with no letter.
+    const Crs crs = crs_of_keys({{1, 1, 0, 2, 1024, 0, 1, 1, 1026, 34737, 0, 5, 3073, 34737, 8, 60000}, {}, "UTM|"});
+    EXPECT_EQ(crs.name, "");
+    // A unit of its own size, which begins where the doubles end.
+    EXPECT_THROW((void)crs_of_keys({{1, 1, 0, 2, 1024, 0, 1, 1, 3076, 0, 1, 32767, 3077, 34736, 0, 1}, {2.0}, ""}),
+                 Error);
+}
+
 TEST(Rasters, units_follow_keys_codes_and_texts) {
     EXPECT_EQ(crs_of_keys(utm_33()).unit_m, 1);
     const auto of_code = [](int code) { return crs_of_keys(with_value(with_value({}, 1024, 1), 3072, code)); };
