@@ -9,6 +9,7 @@
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/merged_cloud.h"
 #include "ao/sequence/sequence_ao.h"
+#include "projection/base/finding.h"
 
 #include <memory>
 #include <optional>
@@ -54,8 +55,8 @@ class FrameAo {
         return errors_of(shipped_error_tables(), name_, settings_, class_of(noise), together);
     }
 
-    /// Sentences: why the result of the last compute() may be wrong; empty = no reason known.
-    [[nodiscard]] const std::vector<std::string>& doubts() const { return method_.remarks().doubts; }
+    /// What speaks for and against the result of the last compute().
+    [[nodiscard]] const Findings& findings() const { return method_.remarks().findings; }
     /// Sentences: what the last compute() did otherwise than asked.
     [[nodiscard]] const std::vector<std::string>& warnings() const { return method_.remarks().warnings; }
     /// Where the time of the last compute() went, in order of execution.

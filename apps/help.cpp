@@ -165,8 +165,9 @@ void print_overview(std::span<const CommandRow> commands) {
     for (const CommandRow& row : commands)
         fmt::print("  scanshade {:<14} {}\n", row.name, row.summary);
     fmt::print("  scanshade {:<14} {}\n  scanshade {:<14} {}\n", "help",
-               "this, or the flags of one command: help COMMAND; help formats: what is read and written", "--version",
-               "the version");
+               "this, or the flags of one command: help COMMAND; help formats: what is read and written; help checks: "
+               "what makes a result doubtful",
+               "--version", "the version");
     fmt::print("\n");
     for (const auto& [code, meaning] : exit_codes)
         fmt::print("{} {} {}\n", code == all_well ? "Exit code:" : "          ", static_cast<int>(code), meaning);

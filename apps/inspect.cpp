@@ -98,8 +98,8 @@ void add_frame(const ExaminedFrame& examined, const CaptureEntry& entry, Samples
         ++samples.clouds[describe(*frame.cloud->records)];
     else
         ++samples.depth_sizes[{examined.depth_size.width, examined.depth_size.height}];
-    for (const auto* sentences : {&frame.warnings, &frame.doubts})
-        for (const std::string& sentence : *sentences)
+    for (const auto& sentences : {frame.warnings, doubts_in(frame.findings)})
+        for (const std::string& sentence : sentences)
             if (const std::string whole = frame.name + ": " + sentence; // those of the listing are there already
                 std::ranges::find(samples.warnings, whole) == samples.warnings.end())
                 samples.warnings.push_back(whole);
@@ -177,7 +177,7 @@ void doubt_images(Findings& findings, const std::vector<std::size_t>& loadable) 
             if (frame.cloud || frame.camera.pinhole.fx == 0)
                 continue;
             const Camera camera = camera_of(frame);
-            for (const std::string& doubt : doubts_about(camera, project(frame), capture.unit))
+            for (const std::string& doubt : doubts_in(findings_about(camera, project(frame), capture.unit)))
                 warnings.push_back(frame.name + ": " + doubt);
         } catch (const OutOfMemory&) {
             throw;

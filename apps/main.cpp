@@ -1,6 +1,7 @@
 // The program: the table of commands, their help, and the exit codes.
 #include "apps/command.h"
 #include "apps/command_parser.h"
+#include "apps/doubts/checks.h"
 #include "apps/help.h"
 #include "io/output_file.h"
 #include "projection/base/error.h"
@@ -83,6 +84,8 @@ int execute(const std::vector<std::string>& arguments) {
             print_json(commands);
         else if (arguments.size() > 1 && arguments[1] == "formats")
             print_formats(arguments.size() > 2 && arguments[2] == "--markdown");
+        else if (arguments.size() > 1 && arguments[1] == "checks")
+            fmt::print("{}", arguments.size() > 2 && arguments[2] == "--markdown" ? checks_markdown() : checks_text());
         else if (arguments.size() > 1)
             print_help(command_named(arguments[1]), arguments.size() > 2 ? arguments[2] : "");
         else

@@ -1,6 +1,7 @@
 // What was recorded at one instant: colour with depth, or a cloud; the first value of the walk.
 #pragma once
 
+#include "projection/base/finding.h"
 #include "projection/camera.h"
 
 #include <Eigen/Geometry>
@@ -48,7 +49,7 @@ struct Frame {
     std::optional<Eigen::Isometry3d> world_from_camera;
     Registration registration = Registration::unknown;
     std::vector<std::string> warnings; ///< what was unusual and how it was handled; complete sentences
-    std::vector<std::string> doubts;   ///< why what was read may be wrong; complete sentences
+    Findings findings;                 ///< of what was read
 };
 
 } // namespace scanshade

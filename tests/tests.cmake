@@ -131,11 +131,13 @@ else()
   include(tests/package/tests.cmake)
 
   # Perturbed clouds: takes minutes, so ctest leaves it alone.
-  add_executable(cloud_gauntlet tests/gauntlet/cloud_gauntlet.cpp tests/gauntlet/perturb.cpp)
+  add_executable(cloud_gauntlet tests/gauntlet/cloud_gauntlet.cpp tests/gauntlet/perturb.cpp
+                                tests/gauntlet/check_rows.cpp)
   target_link_libraries(cloud_gauntlet apps_run)
   target_compile_definitions(cloud_gauntlet PRIVATE SCANSHADE_SOURCE="${PROJECT_SOURCE_DIR}")
   # Perturbed recordings: those of the shared data take minutes, generated ones seconds.
-  add_executable(recording_gauntlet tests/gauntlet/recording_gauntlet.cpp tests/gauntlet/perturb_recordings.cpp)
+  add_executable(recording_gauntlet tests/gauntlet/recording_gauntlet.cpp
+                                    tests/gauntlet/perturb_recordings.cpp tests/gauntlet/check_rows.cpp)
   target_link_libraries(recording_gauntlet apps opencv_imgcodecs opencv_imgproc)
   add_dependencies(recording_gauntlet scanshade)
   target_compile_definitions(recording_gauntlet PRIVATE SCANSHADE_PROGRAM="$<TARGET_FILE:scanshade>"

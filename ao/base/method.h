@@ -2,6 +2,7 @@
 #pragma once
 
 #include "projection/base/error.h"
+#include "projection/base/finding.h"
 #include "projection/base/parameters.h"
 #include "projection/base/splat.h"
 #include "projection/base/station.h"
@@ -108,7 +109,7 @@ struct Intermediate {
 /// Sentences about one result.
 struct MethodRemarks {
     std::vector<std::string> warnings = {}; ///< what was done otherwise than asked
-    std::vector<std::string> doubts = {};   ///< why the result may be wrong
+    Findings findings = {};                 ///< what speaks for and against the result
 };
 
 /// One AO method, made for one device. Not thread-safe: one frame at a time.
@@ -151,8 +152,8 @@ struct PointVisibility {
     double radius = 0, spacing = 0;       ///< as used, in the cloud's unit; spacing 0 = not measured
     std::optional<double> expected_error; ///< RMS of `error`; nothing where it was not estimated
     int tiles = 1;
-    std::vector<std::string> notes;  ///< sentences: what was chosen and why
-    std::vector<std::string> doubts; ///< sentences: why the result may be wrong; empty = none
+    std::vector<std::string> notes; ///< sentences: what was chosen and why
+    Findings findings;              ///< what speaks for and against them
     Timings timings;
 };
 

@@ -56,10 +56,12 @@ PointVisibility CloudAo::of_scans(PointSet cloud, const std::optional<Vector3d>&
     PointVisibility result = compute(cloud, scanner);
     result.timings.insert(result.timings.begin(), {"stations", judged_ms});
     result.notes.push_back(found.note);
-    if (on_planes && believed && found.opposed > hardly_opposed)
-        result.doubts.push_back(fmt::format("{:.0f} % of the recorded normals face away from the scanner that recorded "
-                                            "them; they were turned: --cloud.normals recorded keeps them.",
-                                            100 * found.opposed));
+    if (on_planes && believed)
+        at_most(result.findings, Check::normals_to_station, found.opposed, hardly_opposed, [&] {
+            return fmt::format("{:.0f} % of the recorded normals face away from the scanner that recorded them; they "
+                               "were turned: --cloud.normals recorded keeps them.",
+                               100 * found.opposed);
+        });
     return result;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/cloud/settled_sides.h"
+#include "projection/base/finding.h"
 
 #include <cstdint>
 #include <optional>
@@ -23,14 +24,14 @@ struct FittedCounts {
 /// As told_sides() about noise; none where no point was moved.
 [[nodiscard]] std::optional<std::string> told_noise(const FittedCounts& fitted);
 
-/// A doubt where noise was left in layers.
-[[nodiscard]] std::optional<std::string> doubted_noise(const FittedCounts& fitted);
+/// Whether noise was left in layers: by the share of rays that leave a front and meet a back.
+void check_noise_left(const FittedCounts& fitted, Findings& findings);
 
-/// Sentences about the expected error of a cloud, and a doubt where its check alone lets expect a very large one. A
-/// large expected error is a property of the result, not a doubt.
+/// About the expected error of a cloud, and what its check alone lets expect: very large, it is a doubt. A large
+/// expected error is a property of the result, not a doubt.
 struct ToldError {
     std::string note;
-    std::optional<std::string> doubt;
+    Finding by_part;
 };
 [[nodiscard]] ToldError told_error(double error, double by_check);
 

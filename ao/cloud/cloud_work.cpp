@@ -167,8 +167,7 @@ CloudWork CloudWork::of_tile(const CloudSetup& setup, const PointSet& tile, cons
 PointVisibility CloudWork::run() {
     tile(valid_, valid_);
     require_results();
-    for (const std::string& sentence : sides_.doubts)
-        doubt(sentence);
+    std::ranges::copy(sides_.findings, std::back_inserter(result_.findings));
     compute_thinned();
     compute_strays();
     copy_to_twins();
@@ -331,8 +330,7 @@ void CloudWork::tell_error() {
         return;
     const ToldError told = told_error(*result_.expected_error, error_by_check_);
     result_.notes.push_back(told.note);
-    if (told.doubt)
-        doubt(*told.doubt);
+    result_.findings.push_back(told.by_part);
 }
 
 /// Values for `core`, a part of `round`; on the GPU if its memory suffices.
@@ -358,7 +356,7 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
     CloudSurface& surface = planes.surface;
     FittedCloud& fitted = planes.points;
     if (role_ == Role::cloud)
-        doubt_lines(surface);
+        check_lines(surface);
     const std::vector<std::uint32_t> lonely = drop_strays(surface, decided_.extent.centre, result_.spacing);
     std::optional<DiscRays> rays;
     std::vector<float> side_known;
@@ -536,18 +534,15 @@ void CloudWork::turn_to_cameras(CloudSurface& surface, const FittedCloud& fitted
     });
 }
 
-void CloudWork::doubt_lines(const CloudSurface& surface) {
+void CloudWork::check_lines(const CloudSurface& surface) {
     // 0.17 .. 0.6 in sweeps of 64 and 16 lasers along a street, 0.1 in a scan from a tripod.
     constexpr double many = 0.15;
-    if (const double share = share_on_lines(surface); share > many)
-        doubt(fmt::format("{:.0f} % of the points have all near neighbours on a line, as in the rings of a spinning "
-                          "lidar: planes across the lines are guesses. Several sweeps in one cloud fill the gaps.",
-                          100 * share));
-}
-
-void CloudWork::doubt(const std::string& sentence) {
-    if (std::find(result_.doubts.begin(), result_.doubts.end(), sentence) == result_.doubts.end())
-        result_.doubts.push_back(sentence);
+    const double share = share_on_lines(surface);
+    at_most(result_.findings, Check::points_on_lines, share, many, [&] {
+        return fmt::format("{:.0f} % of the points have all near neighbours on a line, as in the rings of a spinning "
+                           "lidar: planes across the lines are guesses. Several sweeps in one cloud fill the gaps.",
+                           100 * share);
+    });
 }
 
 /// Neighbours and planes of these points, without their noise.
@@ -631,8 +626,7 @@ bool CloudWork::recorded() const {
 }
 
 void CloudWork::tell() {
-    if (const auto left = doubted_noise(fitted_))
-        doubt(*left);
+    check_noise_left(fitted_, result_.findings);
     if (const auto told = told_noise(fitted_))
         result_.notes.push_back(*told);
     result_.notes.push_back(told_sides(sides_, recorded()));

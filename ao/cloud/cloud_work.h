@@ -169,8 +169,7 @@ class CloudWork {
                 const std::vector<float>& backs, const Indices& round, const Wanted& wanted);
     [[nodiscard]] std::vector<float> sides_as_in_whole(CloudSurface& surface) const;
     void turn_to_cameras(CloudSurface& surface, const FittedCloud& fitted, const Indices& round);
-    void doubt_lines(const CloudSurface& surface);
-    void doubt(const std::string& sentence);
+    void check_lines(const CloudSurface& surface);
     [[nodiscard]] Fitted planes_of(const Indices& which, CloudGpu* gpu);
     [[nodiscard]] bool recorded() const;
     void tell();

@@ -271,8 +271,7 @@ class LargeCloud {
         if (whole_.normals_refused)
             result_.notes.push_back(work.notes().back());
         told_sides_ = told_sides(work.sides(), recorded_);
-        for (const std::string& sentence : work.sides().doubts)
-            doubt(sentence);
+        std::ranges::copy(work.sides().findings, std::back_inserter(result_.findings));
         const NormalOrientation::Kind kind = work.sides().orientation.kind;
         by_sample_ = kind != NormalOrientation::Kind::viewpoint && kind != NormalOrientation::Kind::direction;
         watch_.lap("sides");
@@ -431,8 +430,7 @@ class LargeCloud {
         if (result_.expected_error) {
             const ToldError told = told_error(*result_.expected_error, part ? part->error() : 0);
             told_error_ = told.note;
-            if (told.doubt)
-                doubt(*told.doubt);
+            result_.findings.push_back(told.by_part);
         }
         watch.lap("check on a part");
     }
@@ -469,10 +467,6 @@ class LargeCloud {
             result_.notes.push_back(told_error_);
     }
 
-    void doubt(const std::string& sentence) {
-        if (std::ranges::find(result_.doubts, sentence) == result_.doubts.end())
-            result_.doubts.push_back(sentence);
-    }
     void may_stop() const {
         if (stop_ && stop_())
             throw Outage("interrupted");

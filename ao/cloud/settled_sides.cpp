@@ -127,7 +127,7 @@ void SettledSides::turn_to(CloudSurface& surface, const std::function<Vector3d(s
 
 void SettledSides::decide_by_scanner(const CloudSurface& surface, Sides& found) const {
     constexpr double most = 0.85;
-    if (!found.doubt || !seen_from)
+    if (!found.doubted() || !seen_from)
         return;
     const Vector3f scanner = (*seen_from - surface.middle).cast<float>();
     double facing = 0, all = 0;
@@ -138,43 +138,47 @@ void SettledSides::decide_by_scanner(const CloudSurface& surface, Sides& found) 
     }
     if (facing > (1 - most) * all && facing < most * all)
         return;
-    found.doubt.reset();
+    found.finding->doubt.clear();
     found.why = "to the scanner's position, which decides between both sides";
     if (facing < most * all)
         for (std::int8_t& sign : found.sign)
             sign = static_cast<std::int8_t>(-sign);
 }
 
-std::optional<std::string> SettledSides::objection(const CloudSurface& surface, std::optional<DiscRays>& rays,
-                                                   bool in_order) const {
+Finding SettledSides::objection(const CloudSurface& surface, std::optional<DiscRays>& rays, bool in_order) const {
     using Kind = NormalOrientation::Kind;
     const bool viewed = orientation.kind == Kind::viewpoint;
     if (z_up_ && orientation.kind == Kind::terrain) {
         // The sky sees it: no station need be found, which plants prevent.
         constexpr float down = -0.5F; // of the normals along the axis, those up less those down
-        return rise_along(surface, up_.cast<float>()) > down
-                   ? std::nullopt
-                   : std::optional<std::string>(
-                         "most of the recorded normals look down, though the cloud seems to be seen from above; they "
-                         "are "
-                         "kept: --cloud.outside up turns them, --cloud.normals recorded is sure of them.");
+        const double rise = rise_along(surface, up_.cast<float>());
+        Finding sky{Check::normals_to_sky, rise, down, {}};
+        if (rise <= down)
+            sky.sentence =
+                "most of the recorded normals look down, though the cloud seems to be seen from above; they are "
+                "kept: --cloud.outside up turns them, --cloud.normals recorded is sure of them.";
+        return sky;
     }
     const Patches patches = patches_of(surface);
+    Finding space{Check::normals_to_space, 0, nearly_all_opposed, {}};
     const auto objects = [&](const SidesEffort& effort) {
         constexpr double tie = 0.05; // of the points
         const Sides found = found_in(surface, patches, rays, effort);
         const bool as_good =
             !found.sure && found.explained_as_given && *found.explained_as_given > *found.explained - tie;
-        return !found.doubt && !as_good && opposed_share(surface, found) > nearly_all_opposed;
+        space.value = opposed_share(surface, found);
+        return !found.doubted() && !as_good && space.value > nearly_all_opposed;
     };
     constexpr SidesEffort quick{4000, 60, 300, true};
     if (!objects(quick) || (!viewed && !objects({.given_too = true})))
-        return std::nullopt;
+        return space;
     if (orientation.kind == Kind::terrain && in_order) // z may point anywhere
-        return std::nullopt;
-    return fmt::format("nearly all recorded normals face away from {}; they are kept: --cloud.outside turns them, "
-                       "--cloud.normals recorded is sure of them.",
-                       viewed ? orientation.why : "where scanners could have stood");
+        return space;
+    space.sentence =
+        fmt::format("nearly all recorded normals face away from {}; they are kept: --cloud.outside turns them, "
+                    "--cloud.normals recorded is sure of them.",
+                    viewed ? orientation.why : "where scanners could have stood");
+    return space;
 }
 
 bool SettledSides::asks_part(std::size_t points) const {
@@ -252,9 +256,11 @@ std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::opt
             if (opposed_share(surface, sides_of(surface, patches_of(surface), &*rays, {})) > hardly_opposed) {
                 recorded_kept = repaired = false;
                 turn(surface, seen.sign, fmt::format("{:.0f} % of them faced away from the scanner", 100 * opposed));
-                doubts.push_back(fmt::format("{:.0f} % of the recorded normals face away from {}; they were turned: "
-                                             "--cloud.normals recorded keeps them.",
-                                             100 * opposed, orientation.why));
+                at_most(findings, Check::normals_to_scanner, opposed, hardly_opposed, [&] {
+                    return fmt::format("{:.0f} % of the recorded normals face away from {}; they were turned: "
+                                       "--cloud.normals recorded keeps them.",
+                                       100 * opposed, orientation.why);
+                });
                 return std::move(seen.confidence);
             }
         }
@@ -266,19 +272,17 @@ std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::opt
         std::optional<DiscRays> rays_of_some;
         return objection(some, rays_of_some, recorded_kept);
     };
-    const std::optional<std::string> doubt = !asks_part(surface.size())        ? objection(surface, rays, recorded_kept)
-                                             : early_.valid() && recorded_kept ? early_.get()
-                                                                               : of_part();
-    if (doubt)
-        doubts.push_back(*doubt);
+    findings.push_back(!asks_part(surface.size())        ? objection(surface, rays, recorded_kept)
+                       : early_.valid() && recorded_kept ? early_.get()
+                                                         : of_part());
     return known;
 }
 
 void SettledSides::note(const Sides& found) {
     if (!found.why.empty())
         orientation.why = found.why;
-    if (found.doubt)
-        doubts.push_back(*found.doubt);
+    if (found.finding)
+        findings.push_back(*found.finding);
 }
 
 } // namespace scanshade

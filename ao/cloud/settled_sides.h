@@ -3,6 +3,7 @@
 
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/sides/sides.h"
+#include "projection/base/finding.h"
 
 #include <functional>
 #include <future>
@@ -22,9 +23,9 @@ class SettledSides {
 
     NormalOrientation orientation;            ///< as given or guessed; `why` becomes what was found
     std::optional<Eigen::Vector3d> seen_from; ///< where the scanner of all points stood, if that is known
-    std::vector<std::string> doubts;          ///< sentences, some of them twice
-    std::size_t turned_points = 0;            ///< whose recorded normals were turned
-    std::size_t judged_points = 0;            ///< of the surfaces where some were
+    Findings findings;
+    std::size_t turned_points = 0; ///< whose recorded normals were turned
+    std::size_t judged_points = 0; ///< of the surfaces where some were
     std::string turned_why;
     bool recorded_kept = false; ///< all of them
     bool repaired = false;      ///< some were turned to agree with their neighbours, whatever `orientation` is
@@ -45,10 +46,9 @@ class SettledSides {
   private:
     [[nodiscard]] Sides found_in(const CloudSurface& surface, const Patches& patches, std::optional<DiscRays>& rays,
                                  const SidesEffort& effort = {}) const;
-    /// A sentence where nearly all recorded sides face away from where scanners could have stood. `in_order`: they did
+    /// A doubt where nearly all recorded sides face away from where scanners could have stood. `in_order`: they did
     /// not contradict each other. `rays` as for settle().
-    [[nodiscard]] std::optional<std::string> objection(const CloudSurface& surface, std::optional<DiscRays>& rays,
-                                                       bool in_order) const;
+    [[nodiscard]] Finding objection(const CloudSurface& surface, std::optional<DiscRays>& rays, bool in_order) const;
     /// Of clouds of so many points, only a part is asked.
     [[nodiscard]] bool asks_part(std::size_t points) const;
     /// Where both sides would do, that to the scanner is right.
@@ -61,7 +61,7 @@ class SettledSides {
     const CloudAoOptions& options_;
     Eigen::Vector3d up_;
     bool z_up_;
-    std::future<std::optional<std::string>> early_; ///< what object_early() began
+    std::future<Finding> early_; ///< what object_early() began
 };
 
 } // namespace scanshade

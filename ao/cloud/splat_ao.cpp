@@ -157,7 +157,7 @@ std::vector<float> settle(SettledSides& sides, CloudSurface& surface, const Disc
         return known;
     constexpr double much = 0.1; // of the splats: enough to choose between two answers of the whole
     if (turn_to_place(surface, soft, (asked.point - surface.middle).cast<float>(), known) > much)
-        sides.doubts.clear();
+        sides.findings.clear();
     sides.orientation = asked;
     sides.orientation.why += ", where it sees them";
     return known;
@@ -241,7 +241,7 @@ void SplatWork::of_surface(const Indices& which) {
     attach(surface, values, side_known, which);
     give_to_haze(surface, which);
     watch.lap("gather");
-    result_.doubts = sides.doubts;
+    result_.findings = sides.findings;
     result_.notes.push_back(
         fmt::format("normals: the shortest axes of {} flat splats, planes through 16 neighbours for {} "
                     "others, {}.",

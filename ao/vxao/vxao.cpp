@@ -183,7 +183,8 @@ void Vxao::look_at(gpu::Program& program, int first_own) {
         fmt::format("voxels of {:.3g} m would take some {:.0f} MiB, and {} MiB are there (--vxao.memory)",
                     options_.voxel_m, wanted_mib, taken_mib);
     if (room.finest == count) {
-        remarks_.doubts.push_back(why + ": not even the largest have room, so nothing is occluded.");
+        must_not(remarks_.findings, Check::voxel_room, true,
+                 [&] { return why + ": not even the largest have room, so nothing is occluded."; });
         return;
     }
     const double used_m = options_.voxel_m * (1 << room.finest), voxels = options_.screen.radius / used_m;
@@ -191,7 +192,9 @@ void Vxao::look_at(gpu::Program& program, int first_own) {
                                              "surface than that does not occlude.",
                                              why, used_m, voxels);
     constexpr double fewest = 7.9; // as quality lowest has them
-    (voxels < fewest ? remarks_.doubts : remarks_.warnings).push_back(sentence);
+    at_least(remarks_.findings, Check::voxel_room, voxels, fewest, [&] { return sentence; });
+    if (voxels >= fewest)
+        remarks_.warnings.push_back(sentence);
 }
 
 std::vector<std::byte> Vxao::constants(const shared::ScreenConstants& screen) const {

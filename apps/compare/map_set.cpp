@@ -1,6 +1,7 @@
 #include "apps/compare/map_set.h"
 
 #include "apps/json.h"
+#include "io/clouds/format.h"
 #include "io/images/image_file.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -15,23 +16,28 @@ namespace fs = std::filesystem;
 
 namespace {
 
-bool is_map(const fs::path& file) {
-    return fs::is_regular_file(file) && !file.filename().string().starts_with('.') && has_ao_extension(file);
-}
+bool holds_map(const fs::path& file) { return has_ao_extension(file); }
+bool holds_cloud(const fs::path& file) { return has_cloud_extension(file); }
 
-std::map<std::string, fs::path> maps_in(const fs::path& folder) {
+std::map<std::string, fs::path> maps_in(const fs::path& folder, bool (*holds)(const fs::path&) = holds_map) {
     std::map<std::string, fs::path> files;
+    if (!fs::is_directory(folder))
+        return files;
     for (const auto& entry : fs::directory_iterator(folder)) {
-        if (!is_map(entry.path()))
+        const fs::path& file = entry.path();
+        if (!fs::is_regular_file(file) || file.filename().string().starts_with('.') || !holds(file))
             continue;
         const auto [there, fresh] = files.emplace(entry.path().stem().string(), entry.path());
         if (!fresh)
             throw Error(fmt::format("{}: {} and {} are maps of the same name; remove one of them", folder.string(),
                                     there->second.filename().string(), entry.path().filename().string()));
     }
-    if (files.empty())
-        throw Error(fmt::format("{}: no maps found (.png, .tiff or .exr expected)", folder.string()));
     return files;
+}
+
+std::map<std::string, fs::path> maps_or_clouds(const fs::path& maps, const fs::path& clouds) {
+    std::map<std::string, fs::path> files = maps_in(maps);
+    return files.empty() ? maps_in(clouds, holds_cloud) : files;
 }
 
 json read_json(const fs::path& file) {
@@ -91,19 +97,18 @@ std::string some_names(const MapSet& set) {
 
 MapSet find_maps(const fs::path& path) {
     MapSet set{path, "", {}, {}, {}, {}, {}};
-    if (fs::is_directory(path / "ao")) {
+    if (fs::is_directory(path / "ao") || fs::is_directory(path / "clouds")) {
         set.kind = "run";
-        set.files = maps_in(path / "ao");
-        if (fs::is_directory(path / "confidence"))
-            set.confidence = maps_in(path / "confidence");
+        set.files = maps_or_clouds(path / "ao", path / "clouds");
+        set.confidence = maps_in(path / "confidence");
         learn_from_manifest(set);
-    } else if (fs::is_directory(path / "truth/ao")) {
+    } else if (fs::is_directory(path / "truth")) {
         set.kind = "truth";
-        set.files = maps_in(path / "truth/ao");
+        set.files = maps_or_clouds(path / "truth/ao", path / "truth");
         learn_from_truth(set);
     } else if (fs::is_directory(path)) {
         set.kind = "folder";
-        set.files = maps_in(path);
+        set.files = maps_or_clouds(path, path);
     } else if (fs::is_regular_file(path)) {
         set.kind = "map";
         set.files.emplace(path.stem().string(), path);
@@ -111,6 +116,8 @@ MapSet find_maps(const fs::path& path) {
         throw Error(fmt::format(
             "{}: not there; a run's output, a folder of maps, a map or a generated capture expected", path.string()));
     }
+    if (set.files.empty())
+        throw Error(fmt::format("{}: no maps found (.png, .tiff or .exr expected), and no clouds", path.string()));
     return set;
 }
 
@@ -119,12 +126,10 @@ MapSet truth_of(const MapSet& run) {
         throw Error(
             fmt::format("{}: no manifest.json says which capture it was made from; name the truth as second PATH",
                         run.path.string()));
-    if (!fs::is_directory(run.capture / "truth/ao"))
-        throw Error(fmt::format("{}: made from {}, which has no truth/ao (generated captures have)", run.path.string(),
+    if (!fs::is_directory(run.capture / "truth"))
+        throw Error(fmt::format("{}: made from {}, which has no truth (generated captures have)", run.path.string(),
                                 run.capture.string()));
-    MapSet truth{run.capture, "truth", maps_in(run.capture / "truth/ao"), {}, {}, {}, {}};
-    learn_from_truth(truth);
-    return truth;
+    return find_maps(run.capture);
 }
 
 std::vector<MapPair> paired(const MapSet& a, const MapSet& b) {

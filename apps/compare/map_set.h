@@ -21,8 +21,9 @@ struct MapSet {
     std::optional<double> radius_m; ///< the method's or the truth's, where known
 };
 
-/// A folder with ao/ is a run, one with truth/ao/ a generated capture; of other folders the images are taken. A file is
-/// a single map. Throws Error naming the path where it does not exist or holds no map.
+/// A folder with ao/ or clouds/ is a run, one with truth/ a generated capture; of other folders the images are taken,
+/// or where there are none, the clouds. A file is a single map or cloud. Throws Error naming the path where it does not
+/// exist or holds no map.
 [[nodiscard]] MapSet find_maps(const std::filesystem::path& path);
 
 /// The truth of the capture that `run` was made from. Throws Error where the run does not name the capture or it has no

@@ -47,31 +47,38 @@ bool is_cut_out(const cv::Mat1f& z_m) {
     return inside > most * box.area() && inside > least * static_cast<double>(z_m.total());
 }
 
-void doubt_shares(const ComputedFrame& computed, Doubts& doubts) {
+void check_shares(const ComputedFrame& computed, Findings& findings) {
     const bool image = !computed.frame.cloud || (computed.frame.cloud->organised() && !computed.of_points);
     if (computed.valid_share == 0) {
-        add_if(computed.frame.doubts.empty(), doubts,
-               computed.frame.cloud ? "no point is valid." : "no pixel holds a valid depth.");
+        must_not(findings, Check::no_depth, !any_doubt(computed.frame.findings),
+                 [&] { return computed.frame.cloud ? "no point is valid." : "no pixel holds a valid depth."; });
         return;
     }
-    add_if(image && computed.valid_share < least_share && !is_cut_out(computed.depth.z_m), doubts,
-           fmt::format("only {:.1f} % of the pixels hold a depth: what hides in the holes cannot occlude.",
-                       100 * computed.valid_share));
+    if (image)
+        add_finding(findings, Check::holes, computed.valid_share, least_share,
+                    computed.valid_share < least_share && !is_cut_out(computed.depth.z_m), [&] {
+                        return fmt::format("only {:.1f} % of the pixels hold a depth: what hides in the holes cannot "
+                                           "occlude.",
+                                           100 * computed.valid_share);
+                    });
     if (image && computed.valid_share >= least_share && !computed.depth.z_m.empty()) {
-        const auto [beside, above] = neighboured(computed.depth.z_m);
-        add_if(std::min(beside, above) < least_neighboured, doubts,
-               fmt::format("only {:.0f} % of the valid pixels have a valid one {}: what hides between them cannot "
-                           "occlude.",
-                           100 * std::min(beside, above), beside < above ? "beside them" : "above or below them"));
+        const auto shares = neighboured(computed.depth.z_m);
+        const double least = std::min(shares[0], shares[1]);
+        at_least(findings, Check::scattered_pixels, least, least_neighboured, [&] {
+            return fmt::format("only {:.0f} % of the valid pixels have a valid one {}: what hides between them cannot "
+                               "occlude.",
+                               100 * least, shares[0] < shares[1] ? "beside them" : "above or below them");
+        });
     }
-    add_if(computed.coverage < least_share, doubts,
-           fmt::format("only {:.1f} % of the valid {} got a value.", 100 * computed.coverage,
-                       computed.frame.cloud ? "points" : "pixels"));
+    at_least(findings, Check::coverage, computed.coverage, least_share, [&] {
+        return fmt::format("only {:.1f} % of the valid {} got a value.", 100 * computed.coverage,
+                           computed.frame.cloud ? "points" : "pixels");
+    });
 }
 
 /// `may_be_open()`: all may be open, as of a convex surface.
 template <class MayBeOpen>
-void doubt_values(std::span<const float> values, const MayBeOpen& may_be_open, Doubts& doubts) {
+void check_values(std::span<const float> values, const MayBeOpen& may_be_open, Findings& findings) {
     std::size_t known = 0, closed = 0, open = 0;
     constexpr std::size_t at_once = 1 << 16; // counts of 32 bits: the compiler makes vectors of them
     for (std::size_t begin = 0; begin < values.size(); begin += at_once) {
@@ -87,51 +94,53 @@ void doubt_values(std::span<const float> values, const MayBeOpen& may_be_open, D
     }
     if (known < enough_values)
         return;
-    const auto most = static_cast<std::size_t>(all_alike * static_cast<double>(known));
-    add_if(open > most && !may_be_open(), doubts,
-           "every value is exactly 1, fully open: only flat and convex surfaces read so. Otherwise depth unit, camera "
-           "or radius are wrong.");
-    add_if(closed > most, doubts,
-           "every value is exactly 0, fully closed: no real surface reads so. Depth unit, camera, normals or radius "
-           "are wrong.");
+    const auto of_known = [&](std::size_t count) { return static_cast<double>(count) / static_cast<double>(known); };
+    add_finding(findings, Check::all_open, of_known(open), all_alike, of_known(open) > all_alike && !may_be_open(), [] {
+        return "every value is exactly 1, fully open: only flat and convex surfaces read so. Otherwise depth unit, "
+               "camera or radius are wrong.";
+    });
+    at_most(findings, Check::all_closed, of_known(closed), all_alike, [] {
+        return "every value is exactly 0, fully closed: no real surface reads so. Depth unit, camera, normals or "
+               "radius are wrong.";
+    });
 }
 
 } // namespace
 
-std::vector<std::string> doubts_about(const Camera& camera, const DepthImage& depth, const LengthUnit& unit) {
-    Doubts doubts;
-    doubt_camera(camera, doubts);
-    doubt_kind(depth, doubts);
-    doubt_ends(depth, unit, doubts);
-    return doubts;
+Findings findings_about(const Camera& camera, const DepthImage& depth, const LengthUnit& unit) {
+    Findings findings;
+    check_camera(camera, findings);
+    check_kind(depth, findings);
+    check_ends(depth, unit, findings);
+    return findings;
 }
 
-std::vector<std::string> doubts_about(const ComputedFrame& computed, double radius_m, const DepthNoise& noise,
-                                      const LengthUnit& unit) {
-    Doubts doubts = computed.frame.doubts;
-    doubt_shares(computed, doubts);
+Findings findings_about(const ComputedFrame& computed, double radius_m, const DepthNoise& noise,
+                        const LengthUnit& unit) {
+    Findings findings = computed.frame.findings;
+    check_shares(computed, findings);
     if (computed.of_points) {
         const Cloud& cloud = *computed.frame.cloud;
         const PointVisibility& found = *computed.of_points;
-        doubt_unit(cloud, doubts);
-        doubt_points(cloud, doubts);
-        doubt_values(
-            found.visibility, [&] { return !has_hollows(cloud, found); }, doubts);
-        doubt_radius_of_points(cloud, found, doubts);
-        doubt_steps(cloud, found, doubts);
-        return doubts;
+        check_unit(cloud, findings);
+        check_points(cloud, findings);
+        check_values(
+            found.visibility, [&] { return !has_hollows(cloud, found); }, findings);
+        check_radius_of_points(cloud, found, findings);
+        check_steps(cloud, found, findings);
+        return findings;
     }
     const cv::Mat1f& visibility = computed.visibility;
     if (visibility.isContinuous())
-        doubt_values(
+        check_values(
             {visibility.ptr<float>(), visibility.total()},
-            [&] { return radius_m > 0 && !has_hollows(computed.depth, radius_m); }, doubts);
-    doubt_radius_in_view(computed.depth, radius_m, unit, doubts);
-    doubt_noise_in_view(computed.depth, radius_m, noise, unit, doubts);
-    doubt_steps_in_view(radius_m, noise, unit, doubts);
+            [&] { return radius_m > 0 && !has_hollows(computed.depth, radius_m); }, findings);
+    check_radius_in_view(computed.depth, radius_m, unit, findings);
+    check_noise_in_view(computed.depth, radius_m, noise, unit, findings);
+    check_steps_in_view(radius_m, noise, unit, findings);
     if (!computed.frame.cloud) // a cloud's camera is recovered or chosen, not given, unless --camera names it
-        std::ranges::move(doubts_about(computed.camera, computed.depth, unit), std::back_inserter(doubts));
-    return doubts;
+        std::ranges::move(findings_about(computed.camera, computed.depth, unit), std::back_inserter(findings));
+    return findings;
 }
 
 } // namespace scanshade

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "ao/frame.h"
+#include "projection/base/finding.h"
 #include "projection/frame.h"
 #include "projection/length_unit.h"
 #include "projection/sensor/noise.h"
@@ -23,14 +24,13 @@ struct ComputedFrame {
     const PointVisibility* of_points = nullptr; ///< by rays from every point; null = of a view
 };
 
-/// Sentences: what is implausible about a computed frame, its camera or its settings. Empty = nothing is. Real captures
-/// are far from every limit; README.md has the table.
+/// What speaks for and against a computed frame, its camera and its settings. Real captures are far from every limit;
+/// checks.h has the table. The frame's own findings come first.
 /// `noise`: of the depth, where it is an image. `unit`: of the capture, in which the sentences tell lengths.
-[[nodiscard]] std::vector<std::string> doubts_about(const ComputedFrame& computed, double radius_m,
-                                                    const DepthNoise& noise = {}, const LengthUnit& unit = {});
+[[nodiscard]] Findings findings_about(const ComputedFrame& computed, double radius_m, const DepthNoise& noise = {},
+                                      const LengthUnit& unit = {});
 
-/// What is implausible before anything is computed: about a camera, and about a depth image that it took.
-[[nodiscard]] std::vector<std::string> doubts_about(const Camera& camera, const DepthImage& depth,
-                                                    const LengthUnit& unit = {});
+/// Before anything is computed: about a camera, and about a depth image that it took.
+[[nodiscard]] Findings findings_about(const Camera& camera, const DepthImage& depth, const LengthUnit& unit = {});
 
 } // namespace scanshade

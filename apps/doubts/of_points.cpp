@@ -1,6 +1,7 @@
 #include "apps/doubts/of_points.h"
 
 #include "apps/doubts/coordinate_steps.h"
+#include "apps/doubts/sentences.h"
 #include "io/clouds/cloud_file.h"
 #include "io/text.h"
 
@@ -56,54 +57,63 @@ bool has_hollows(const Cloud& cloud, const PointVisibility& found) {
     return static_cast<double>(hollow) > least_share_hollow * static_cast<double>(valid);
 }
 
-void doubt_radius_of_points(const Cloud& cloud, const PointVisibility& found, Doubts& doubts) {
+void check_radius_of_points(const Cloud& cloud, const PointVisibility& found, Findings& findings) {
     const double radius = found.radius, spacing = found.spacing;
     if (!(radius > 0))
         return;
-    add_if(
-        spacing > 0 && radius < least_radius_spacings * spacing, doubts,
-        fmt::format("the radius of {:.3g} is only {:.2g} times the points' spacing of {:.3g}: surfaces within it are "
-                    "single points. Give a larger --radius.",
-                    radius, radius / spacing, spacing));
+    if (spacing > 0)
+        at_least(findings, Check::radius_in_spacings, radius / spacing, least_radius_spacings, [&] {
+            return fmt::format("the radius of {:.3g} is only {:.2g} times the points' spacing of {:.3g}: surfaces "
+                               "within it are single points. Give a larger --radius.",
+                               radius, radius / spacing, spacing);
+        });
     const double extent = extent_of(cloud);
-    add_if(
-        radius > extent, doubts,
-        fmt::format("the radius of {:.3g} is larger than the cloud of {:.3g}: give a smaller --radius, or a cloud of "
-                    "more than a few points.",
-                    radius, extent));
+    at_least(findings, Check::radius_in_cloud, extent / radius, 1, [&] {
+        return fmt::format("the radius of {:.3g} is larger than the cloud of {:.3g}: give a smaller --radius, or a "
+                           "cloud of more than a few points.",
+                           radius, extent);
+    });
 }
 
-void doubt_points(const Cloud& cloud, Doubts& doubts) {
+void check_points(const Cloud& cloud, Findings& findings) {
     constexpr std::size_t fewest = 10, enough = 100;
     const auto& points = cloud.points;
     const auto valid = static_cast<std::size_t>(
         std::ranges::count_if(points, [](const Eigen::Vector3d& point) { return point.allFinite(); }));
     const bool few = valid > 0 && valid < fewest;
-    add_if(few && triangles_of(cloud).empty(), doubts, counted(valid, "point") + " cannot show a surface.");
+    add_finding(findings, Check::few_points, static_cast<double>(valid), fewest, few && triangles_of(cloud).empty(),
+                [&] { return counted(valid, "point") + " cannot show a surface."; });
     double next = points.empty() ? 0 : points.front().x();
-    add_if(points.size() >= enough &&
-               std::ranges::all_of(points, [&](const Eigen::Vector3d& point) { return point.x() == next++; }),
-           doubts, "x is the number of the point: the file's first column counts them, and its coordinates follow.");
+    must_not(
+        findings, Check::point_numbers,
+        points.size() >= enough &&
+            std::ranges::all_of(points, [&](const Eigen::Vector3d& point) { return point.x() == next++; }),
+        [] {
+            return "x is the number of the point: the file's first column counts them, and its coordinates follow.";
+        });
 }
 
-void doubt_steps(const Cloud& cloud, const PointVisibility& found, Doubts& doubts) {
+void check_steps(const Cloud& cloud, const PointVisibility& found, Findings& findings) {
     const double spacing = found.spacing;
     const auto steps = coarse_steps(cloud.points, spacing);
     constexpr double enough_steps = 4; // in the radius: of a voxel grid, whose steps are alike everywhere
-    if (!steps || (steps->in_all && found.radius > enough_steps * steps->step))
-        return;
     constexpr std::array names{"x", "y", "z"};
-    doubts.push_back(fmt::format(
-        "coordinates along {} are multiples of {:.3g}, and points stand {:.3g} apart: surfaces are steps. {}",
-        names.at(static_cast<std::size_t>(steps->axis)), steps->step, spacing,
-        steps->single_precision ? "Single precision holds coordinates of that size no better: write them in double "
-                                  "precision, or without their offset."
-                                : "Write them with more digits, or give a larger --radius."));
+    must_not(findings, Check::coordinate_steps, steps && !(steps->in_all && found.radius > enough_steps * steps->step),
+             [&] {
+                 return fmt::format("coordinates along {} are multiples of {:.3g}, and points stand {:.3g} apart: "
+                                    "surfaces are steps. {}",
+                                    names.at(static_cast<std::size_t>(steps->axis)), steps->step, spacing,
+                                    steps->single_precision
+                                        ? "Single precision holds coordinates of that size no better: write them in "
+                                          "double precision, or without their offset."
+                                        : "Write them with more digits, or give a larger --radius.");
+             });
 }
 
-void doubt_unit(const Cloud& cloud, Doubts& doubts) {
-    add_if(cloud.records && unit_of(*cloud.records).starts_with("degrees"), doubts,
-           "the coordinates are in degrees, so distances between points mean nothing: project them first.");
+void check_unit(const Cloud& cloud, Findings& findings) {
+    must_not(findings, Check::degrees, cloud.records && unit_of(*cloud.records).starts_with("degrees"), [] {
+        return "the coordinates are in degrees, so distances between points mean nothing: project them first.";
+    });
 }
 
 } // namespace scanshade

@@ -8,13 +8,6 @@
 
 namespace scanshade {
 
-using Doubts = std::vector<std::string>; ///< a sentence each
-
-inline void add_if(bool doubtful, Doubts& doubts, const std::string& sentence) {
-    if (doubtful)
-        doubts.push_back(sentence);
-}
-
 /// The values below which 1 % and 99 % lie, and the median.
 struct Spread {
     double low = 0, middle = 0, high = 0;

@@ -5,6 +5,7 @@
 #include "ao/finish/light.h"
 #include "apps/frame/outputs.h"
 #include "io/captures/capture.h"
+#include "projection/base/finding.h"
 #include "projection/project.h"
 #include "projection/sensor/noise.h"
 
@@ -25,12 +26,12 @@ enum class CloudTiles { automatic, join, separate };
 
 struct FrameOptions {
     Outputs outputs;
-    ProjectOptions range;            ///< depth outside counts as a hole
-    double radius_m = 0;             ///< the method's
-    DepthNoise noise;                ///< the depth's, on which confidence depends
-    std::vector<std::string> doubts; ///< about the capture as a whole: each of its images has them
-    std::optional<Light> light;      ///< of the colour images, where outputs need it
-    PointMethod* points = nullptr;   ///< computes clouds and meshes where `cloud_walk` asks for points
+    ProjectOptions range;          ///< depth outside counts as a hole
+    double radius_m = 0;           ///< the method's
+    DepthNoise noise;              ///< the depth's, on which confidence depends
+    Findings findings;             ///< about the capture as a whole: each of its images has them
+    std::optional<Light> light;    ///< of the colour images, where outputs need it
+    PointMethod* points = nullptr; ///< computes clouds and meshes where `cloud_walk` asks for points
     CloudWalk cloud_walk = CloudWalk::automatic;
 };
 

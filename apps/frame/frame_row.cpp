@@ -51,10 +51,11 @@ void shorten(FrameRow& row) {
     row.passes = {}; // not clear(): that would keep the memory
     row.notes = {};
     row.files = {};
+    std::erase_if(row.findings, [](const Finding& finding) { return !is_doubt(finding); });
 }
 
 std::string reason_of(const FrameRow& row) {
-    return row.doubts.empty() ? row.why : fmt::format("{}", fmt::join(row.doubts, " "));
+    return any_doubt(row.findings) ? fmt::format("{}", fmt::join(doubts_in(row.findings), " ")) : row.why;
 }
 
 FrameRow skipped_row(const Capture& capture, std::size_t index) {

@@ -3,6 +3,7 @@
 
 #include "ao/base/method.h"
 #include "io/captures/capture.h"
+#include "projection/base/finding.h"
 #include "projection/camera.h"
 
 #include <cstddef>
@@ -13,7 +14,7 @@
 
 namespace scanshade {
 
-/// Doubtful: computed and written, but the result is implausible; FrameRow::doubts has the reasons.
+/// Doubtful: computed and written, but the result is implausible; FrameRow::findings has the reasons.
 enum class FrameStatus { ok, doubtful, failed, skipped };
 [[nodiscard]] std::string_view name_of(FrameStatus status);
 /// Whether the frame has results.
@@ -37,8 +38,8 @@ struct FrameRow {
     std::size_t index = 0; ///< in capture.entries
     std::string name;
     FrameStatus status = FrameStatus::skipped;
-    std::string why;                 ///< of a failed or skipped frame
-    std::vector<std::string> doubts; ///< of a doubtful frame, sentences
+    std::string why;   ///< of a failed or skipped frame
+    Findings findings; ///< a doubtful frame has doubts in them
     Fault fault = Fault::none;
     cv::Size size;
     double valid_share = 0; ///< pixels or points with a depth / all of them
@@ -55,7 +56,7 @@ struct FrameRow {
 };
 
 /// Frees what the journal keeps and only the manifest needs: camera, passes, notes and files. For thousands of frames
-/// these would take most of a run's memory.
+/// these would take most of a run's memory. Of the findings doubts stay.
 void shorten(FrameRow& row);
 
 /// `why`, or the doubts as one line; empty for a frame that is ok.

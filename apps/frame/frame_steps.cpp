@@ -52,8 +52,8 @@ void refuse_blind_view(const Work& work, const ProjectOptions& range) {
     const std::string reason = work.frame.cloud
                                    ? why_no_point_is_seen(work.frame, range)
                                    : fmt::format("no depth is within {:g} and {:g} m", range.near_m, range.far_m);
-    throw Error(
-        fmt::format("{}{}{}", reason, work.frame.doubts.empty() ? "" : "; ", fmt::join(work.frame.doubts, " ")));
+    const std::vector<std::string> doubts = doubts_in(work.frame.findings);
+    throw Error(fmt::format("{}{}{}", reason, doubts.empty() ? "" : "; ", fmt::join(doubts, " ")));
 }
 
 void require_memory_for(const Cloud& cloud) {
@@ -65,7 +65,7 @@ void require_memory_for(const Cloud& cloud) {
 void take_points(Work& work, PointVisibility found) {
     work.of_points = std::move(found);
     std::ranges::copy(work.of_points.notes, std::back_inserter(work.row.notes));
-    std::ranges::copy(work.of_points.doubts, std::back_inserter(work.row.doubts));
+    std::ranges::copy(work.of_points.findings, std::back_inserter(work.row.findings));
     work.confidence.per_point = confidence_of_points(work.of_points.error);
     work.error.per_point = std::move(work.of_points.error);
     work.row.passes = work.of_points.timings;
@@ -77,7 +77,7 @@ void compute_alone(Work& work, FrameAo& method, const DepthNoise& noise) {
     work.fitted = method.fitted_depth();
     work.fitted_normals = method.fitted_normals();
     work.row.passes = method.timings();
-    std::ranges::copy(method.doubts(), std::back_inserter(work.row.doubts));
+    std::ranges::copy(method.findings(), std::back_inserter(work.row.findings));
     std::ranges::copy(method.warnings(), std::back_inserter(work.row.warnings));
 }
 
@@ -98,8 +98,10 @@ void describe_frame(Work& work) {
 void choose_points_or_view(Work& work, CloudWalk walk) {
     work.by_points = work.frame.cloud && takes_points(work.frame, walk, work.row.notes);
     if (work.frame.cloud && !work.by_points && !splats_of(*work.frame.cloud).empty())
-        work.row.doubts.emplace_back("one camera's view takes Gaussian splats for solid points at their centres; "
-                                     "--clouds points sees their shapes and opacities.");
+        must_not(work.row.findings, Check::splats_in_view, true, [] {
+            return "one camera's view takes Gaussian splats for solid points at their centres; --clouds points sees "
+                   "their shapes and opacities.";
+        });
 }
 
 void prepare_view(Work& work, const ProjectOptions& range) {
@@ -151,10 +153,11 @@ FrameImages attach_values(Work& work, const FrameOptions& options, const Outputs
     }
     row.coverage = work.attached.coverage;
     row.mean_visibility = work.attached.mean_visibility;
-    std::ranges::move(doubts_about(computed_frame(work), options.radius_m, options.noise, options.outputs.unit),
-                      std::back_inserter(row.doubts));
+    std::ranges::move(findings_about(computed_frame(work), options.radius_m, options.noise, options.outputs.unit),
+                      std::back_inserter(row.findings));
     if (!work.by_points)
-        std::ranges::copy(options.doubts, std::back_inserter(row.doubts));
+        std::ranges::copy(options.findings, std::back_inserter(row.findings));
+    std::ranges::move(warnings_in(row.findings), std::back_inserter(row.warnings));
     return images;
 }
 

@@ -33,7 +33,7 @@ double compute_in_sequence(Work& work, const Capture& capture, SequenceAo& seque
     work.looked_at = std::move(result.depth);
     work.row.passes = std::move(result.timings);
     work.row.other_frames = result.others();
-    std::ranges::move(result.remarks.doubts, std::back_inserter(work.row.doubts));
+    std::ranges::move(result.remarks.findings, std::back_inserter(work.row.findings));
     std::ranges::move(result.remarks.warnings, std::back_inserter(work.row.warnings));
     if (!result.fused.empty())
         work.row.notes.push_back("depth is averaged with frames " + names_of(capture, result.fused) + ".");

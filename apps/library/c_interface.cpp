@@ -302,7 +302,7 @@ class DepthFrames {
         frame.name = listing_.entries[index].name;
         frame.camera = camera_;
         frame.depth_m = depth_in_metres(stored, encoding_);
-        frame.doubts = doubts_about(frame.depth_m, stored, encoding_);
+        frame.findings = findings_about(frame.depth_m, stored, encoding_);
         frame.world_from_camera = listing_.entries[index].world_from_camera;
         return frame;
     }
@@ -486,8 +486,11 @@ const char* scanshade_result_info(const scanshade_result* result) {
 const char* scanshade_result_doubt(const scanshade_result* result, int64_t image, int64_t number) {
     if (!result || image < 0 || number < 0 || image >= static_cast<int64_t>(result->result.rows.size()))
         return nullptr;
-    const auto& doubts = result->result.rows[static_cast<std::size_t>(image)].doubts;
-    return number < static_cast<int64_t>(doubts.size()) ? doubts[static_cast<std::size_t>(number)].c_str() : nullptr;
+    std::vector<const char*> doubts; // each once
+    for (const Finding& finding : result->result.rows[static_cast<std::size_t>(image)].findings)
+        if (is_doubt(finding) && std::ranges::find(doubts, finding.sentence) == doubts.end())
+            doubts.push_back(finding.sentence.c_str());
+    return number < static_cast<int64_t>(doubts.size()) ? doubts[static_cast<std::size_t>(number)] : nullptr;
 }
 
 void scanshade_result_free(scanshade_result* result) { delete result; }

@@ -63,7 +63,8 @@ std::string Result::info() const {
     all["device"] = device;
     all["frames"] = json::array();
     for (const FrameRow& row : rows) {
-        json frame{{"name", row.name}, {"notes", row.notes}, {"warnings", row.warnings}, {"doubts", row.doubts}};
+        json frame{
+            {"name", row.name}, {"notes", row.notes}, {"warnings", row.warnings}, {"doubts", doubts_in(row.findings)}};
         frame["coverage"] = row.coverage;
         frame["mean_visibility"] = std::isfinite(row.mean_visibility) ? json(row.mean_visibility) : json();
         frame["expected_error"] = std::isfinite(row.expected_error) ? json(row.expected_error) : json();
@@ -223,7 +224,7 @@ FrameOptions Session::options(Wanted wanted) const {
 FrameOptions Session::options(const Beforehand& known, Wanted wanted) const {
     FrameOptions options = this->options(wanted);
     options.noise = known.look.noise;
-    options.doubts = known.findings.doubts;
+    options.findings = known.findings.findings;
     options.cloud_walk = cloud_walk_for(asked_, known.look);
     if (!known.by_points)
         options.radius_m = radius_for(asked_, known.look);

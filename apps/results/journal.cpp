@@ -1,6 +1,7 @@
 // Lines of JSON, one write and one sync each; the last line on a frame counts.
 #include "apps/results/journal.h"
 
+#include "apps/doubts/checks.h"
 #include "apps/json.h"
 #include "io/content_hash.h"
 #include "io/files.h"
@@ -39,6 +40,24 @@ double number_or_nan(const json& value) {
     return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
 }
 
+json findings_json(const Findings& findings) {
+    json text = json::array();
+    for (const Finding& finding : findings) {
+        text.push_back({row_of(finding.check).name, finding.value, finding.limit});
+        if (!finding.sentence.empty())
+            text.back().push_back(finding.sentence);
+    }
+    return text;
+}
+
+Findings findings_from(const json& text) {
+    Findings findings;
+    for (const json& each : text)
+        findings.push_back({check_named(each.at(0).get<std::string>()), number_or_nan(each.at(1)),
+                            number_or_nan(each.at(2)), each.size() > 3 ? each.at(3).get<std::string>() : ""});
+    return findings;
+}
+
 json row_json(
     const FrameRow& row) { // nlohmann writes NaN as null and every other double so that it reads back the same
     json text{{"index", row.index},
@@ -62,8 +81,8 @@ json row_json(
         text["files"].push_back(file.generic_string());
     if (!row.notes.empty())
         text["notes"] = row.notes;
-    if (!row.doubts.empty())
-        text["doubts"] = row.doubts;
+    if (!row.findings.empty())
+        text["findings"] = findings_json(row.findings);
     if (std::isfinite(row.expected_error))
         text["expected_error"] = row.expected_error;
     if (row.other_frames > 0)
@@ -115,8 +134,11 @@ FrameRow row_from(const json& text) {
         row.files.emplace_back(file.get<std::string>());
     if (text.contains("notes"))
         row.notes = text["notes"].get<std::vector<std::string>>();
-    if (text.contains("doubts"))
-        row.doubts = text["doubts"].get<std::vector<std::string>>();
+    if (text.contains("findings"))
+        row.findings = findings_from(text["findings"]);
+    if (text.contains("doubts")) // of a version without checks
+        for (const json& doubt : text["doubts"])
+            row.findings.push_back({Check::other, 1, 0.5, doubt.get<std::string>()});
     return row;
 }
 

@@ -3,6 +3,7 @@
 
 #include "apps/command_line.h"
 #include "apps/csv.h"
+#include "apps/doubts/checks.h"
 #include "apps/frame/outputs.h"
 #include "apps/json.h"
 #include "io/output_file.h"
@@ -91,8 +92,8 @@ json result_json(const FrameRow& row, bool with_camera, const CaptureEntry& entr
     json text{{"index", row.index}, {"name", row.name}, {"status", name_of(row.status)}};
     if (!row.why.empty())
         text["why"] = row.why;
-    if (!row.doubts.empty())
-        text["doubts"] = row.doubts;
+    if (any_doubt(row.findings))
+        text["doubts"] = doubts_in(row.findings);
     if (!row.size.empty())
         text["size"] = {row.size.width, row.size.height};
     if (with_camera && !row.size.empty())
@@ -344,6 +345,32 @@ std::vector<std::string> write_manifest(const std::filesystem::path& file, const
         stream.flush();
     });
     return left_alone;
+}
+
+void write_checks(const std::filesystem::path& file, const RunReport& report,
+                  const std::function<FrameRow(const FrameRow&)>& whole) {
+    json checks = json::object();
+    for (const CheckRow& row : all_checks())
+        checks[row.name] = {{"of", row.subject}, {"value", row.statistic}, {"doubtful", row.doubtful}};
+    write_atomically(file, [&](const std::filesystem::path& target) {
+        std::ofstream stream(target, std::ios::binary);
+        stream.exceptions(std::ios::failbit | std::ios::badbit);
+        stream << "{\n  \"checks\": " << indented(text_of(checks), "  ") << ",\n  \"frames\": [";
+        const char* between = "";
+        for (const FrameRow& row : report.frames) {
+            json found = json::array();
+            for (const Finding& finding : whole(row).findings)
+                found.push_back({{"check", row_of(finding.check).name},
+                                 {"value", known(finding.value, 6)},
+                                 {"limit", known(finding.limit, 6)},
+                                 {"doubtful", is_doubt(finding)}});
+            stream << std::exchange(between, ",") << "\n    "
+                   << json{{"index", row.index}, {"name", row.name}, {"found", found}}.dump(
+                          -1, ' ', false, json::error_handler_t::replace);
+        }
+        stream << (report.frames.empty() ? "]\n}\n" : "\n  ]\n}\n");
+        stream.flush();
+    });
 }
 
 } // namespace scanshade

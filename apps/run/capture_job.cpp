@@ -67,7 +67,8 @@ void refuse_to_overwrite(const CaptureJob& job) {
     };
     const fs::path journal = journal_file(outputs.folder, "");
     if (!fs::exists(journal) || has_results(outputs.folder))
-        refuse({outputs.folder / "manifest.json", outputs.folder / "frames.csv", journal});
+        refuse(
+            {outputs.folder / "manifest.json", outputs.folder / "frames.csv", outputs.folder / "checks.json", journal});
     if (outputs.mcap)
         refuse({mcap_file(outputs.folder, job.block)});
     refuse_foreign_page(outputs.folder);
@@ -103,7 +104,7 @@ void prepare_folder(const CaptureJob& job, const ReportFiles& reports, bool firs
             stems.insert(entry.name);
     for (const std::size_t index : job.batch.frames) // of a block: others may be under work
         stems.insert(job.capture.entries[index].name);
-    for (const fs::path& report : {reports.table, reports.manifest}) {
+    for (const fs::path& report : {reports.table, reports.manifest, reports.checks}) {
         stems.insert(report.stem().string());
         fs::remove(report);
     }

@@ -41,11 +41,12 @@ struct CaptureJob {
     [[nodiscard]] const std::filesystem::path& folder() const { return batch.outputs.folder; }
 };
 
-/// "frames.csv" and "manifest.json", or "frames.0-500.csv" of a block.
+/// "frames.csv", "manifest.json" and "checks.json", or "frames.0-500.csv" of a block.
 struct ReportFiles {
     ReportFiles(const std::filesystem::path& folder, const std::string& block)
-        : table(folder / named("frames", block, ".csv")), manifest(folder / named("manifest", block, ".json")) {}
-    std::filesystem::path table, manifest;
+        : table(folder / named("frames", block, ".csv")), manifest(folder / named("manifest", block, ".json")),
+          checks(folder / named("checks", block, ".json")) {}
+    std::filesystem::path table, manifest, checks;
 
   private:
     static std::string named(const std::string& stem, const std::string& block, const char* extension) {

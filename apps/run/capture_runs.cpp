@@ -121,7 +121,7 @@ std::vector<FrameRow> CaptureRuns::process(CaptureJob job, OrderedOutput& output
         job.opened->findings = findings_about(job.capture, job.of, asked_);
         std::ranges::copy(job.opened->findings.warnings, std::back_inserter(job.capture.warnings));
     });
-    job.batch.doubts = job.opened->findings.doubts;
+    job.batch.findings = job.opened->findings.findings;
 
     Prepared ready = prepare(job);
     std::optional<RecordingCloud> cloud;
@@ -230,6 +230,8 @@ void CaptureRuns::report_on(const CaptureJob& job, Prepared& ready, const Journa
                 fmt::format("The results are in {}/: the page has numbers, no images.", tar_folder));
         report.peak_mib = peak_memory_mib();
         write_frames_csv(files.table, report.frames);
+        const auto whole_row = [&](const FrameRow& row) { return journal.whole(row); };
+        write_checks(files.checks, report, whole_row);
         page::RunPage page;
         say_left_alone(write_manifest(files.manifest, report, [&](const FrameRow& row) {
             FrameRow whole = journal.whole(row);

@@ -135,8 +135,7 @@ CaptureFindings findings_about(const Capture& capture, const std::vector<std::si
     CaptureFindings found;
     if (const PoseCheck poses = check_poses(capture, frames, load); !poses.warning.empty()) {
         found.warnings.push_back(poses.warning);
-        if (poses.doubts_depths)
-            found.doubts.push_back(poses.warning);
+        must_not(found.findings, Check::pose_scale, poses.doubts_depths, [&] { return poses.warning; });
     }
     if (asked.sequence == SequenceUse::on && !asked.in_sequence(capture))
         found.warnings.emplace_back("--sequence on: fewer than two frames have a pose, so each is computed by itself.");

@@ -4,6 +4,7 @@
 
 #include "apps/frame/frame_options.h"
 #include "apps/session/settings.h"
+#include "projection/base/finding.h"
 #include "projection/project.h"
 
 #include <functional>
@@ -51,7 +52,7 @@ struct CaptureLook {
 /// What is wrong with the capture as a whole.
 struct CaptureFindings {
     std::vector<std::string> warnings;
-    std::vector<std::string> doubts; ///< also among the warnings; each of the capture's images has them
+    Findings findings; ///< their doubts are also among the warnings; each of the capture's images has them
 };
 /// Checks depths against poses. `load`: of images in memory; see check_poses().
 [[nodiscard]] CaptureFindings findings_about(const Capture& capture, const std::vector<std::size_t>& frames,

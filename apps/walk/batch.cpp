@@ -111,7 +111,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
     if (!work.row.why.empty())
         remove_files(work, options.outputs);
     else
-        work.row.status = work.row.doubts.empty() ? FrameStatus::ok : FrameStatus::doubtful;
+        work.row.status = any_doubt(work.row.findings) ? FrameStatus::doubtful : FrameStatus::ok;
 }
 
 std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std::size_t>& frames) {

@@ -175,14 +175,14 @@ std::string frame_text(const Work& work) {
     const FrameRow& row = work.row;
     json text{{"name", row.name},
               {"index", row.index},
-              {"status", row.doubts.empty() ? "ok" : "doubtful"},
+              {"status", any_doubt(row.findings) ? "doubtful" : "ok"},
               {"valid_share", known(row.valid_share)},
               {"coverage", known(row.coverage)},
               {"mean_visibility", known(row.mean_visibility)}};
     if (std::isfinite(row.expected_error))
         text["expected_error"] = known(row.expected_error);
-    if (!row.doubts.empty())
-        text["doubts"] = row.doubts;
+    if (any_doubt(row.findings))
+        text["doubts"] = doubts_in(row.findings);
     return json_line(text);
 }
 

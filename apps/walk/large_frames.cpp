@@ -167,7 +167,7 @@ void compute_large(Work& work, PointMethod& method) {
     if (const std::string unit = unit_of(records); !unit.empty())
         work.row.notes.push_back(fmt::format("coordinates are in {}.", unit));
     std::ranges::copy(found.notes, std::back_inserter(work.row.notes));
-    std::ranges::copy(found.doubts, std::back_inserter(work.row.doubts));
+    std::ranges::copy(found.findings, std::back_inserter(work.row.findings));
 }
 
 void write_large(Work& work, const Outputs& outputs) {

@@ -82,7 +82,7 @@ std::string line_of(const FrameRow& row) {
     std::string line = fmt::format("{}: {}, valid {:.1f} %, coverage {:.1f} %, {}, {:.0f} ms", row.name,
                                    name_of(row.status), 100 * row.valid_share, 100 * row.coverage, visibility,
                                    ms.load + ms.project + ms.compute + ms.attach + ms.write);
-    for (const std::string& doubt : row.doubts)
+    for (const std::string& doubt : doubts_in(row.findings))
         line += "; doubtful: " + doubt;
     for (const std::string& warning : row.warnings)
         line += "; warning: " + warning;
@@ -158,7 +158,7 @@ void Progress::add(const FrameRow& row) {
                       {"status", name_of(row.status)},
                       {"fault", name_of(row.fault)},
                       {"why", row.why},
-                      {"doubts", row.doubts},
+                      {"doubts", doubts_in(row.findings)},
                       {"warnings", row.warnings},
                       {"ms", sum_ms},
                       {"done", done_},

@@ -51,7 +51,7 @@ void examine_depth(const Capture& capture, const CaptureEntry& entry, ExaminedFr
     for (int value = 0; value < metres.cols; ++value)
         if (counts[static_cast<std::size_t>(value)] > 0)
             largest_m = std::max(largest_m, metres(value));
-    examined.frame.doubts = doubts_about(stored, metres, largest_m, encoding);
+    examined.frame.findings = findings_about(stored, metres, largest_m, encoding);
     correct(metres, capture.depth_correction);
     for (int value = 0; value < metres.cols; ++value)
         if (const std::uint32_t count = counts[static_cast<std::size_t>(value)]; count > 0 && metres(value) != 0)

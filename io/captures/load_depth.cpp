@@ -99,7 +99,7 @@ void load_depth(const Capture& capture, const CaptureEntry& entry, const cv::Mat
     const DepthEncoding encoding = encoding_of(capture, entry);
     frame.depth_m = during(entry.depth, [&] { return depth_in_metres(stored, encoding); });
     take_camera(capture, entry, stored.size(), frame);
-    frame.doubts = doubts_about(frame.depth_m, stored, encoding);
+    frame.findings = findings_about(frame.depth_m, stored, encoding);
     if (!entry.confidence.empty())
         leave_out_unsure(entry, capture.confidence_min, frame);
     if (capture.guessed_beyond_m > 0)

@@ -158,7 +158,7 @@ const char* ordinal(int every) { return every == 2 ? "second" : every == 3 ? "th
 
 /// An image that was enlarged by copying pixels repeats rows and columns alike: between the copies are steps, which
 /// occlude. Rows alone are a fault.
-void doubt_repeats(const cv::Mat& image, std::vector<std::string>& doubts) {
+void check_repeats(const cv::Mat& image, Findings& findings) {
     constexpr double least_share = 0.3, alike = 1.25;
     const Repeats rows = repeats_of(image);
     cv::Mat some, transposed; // parts of the columns are enough, and quicker
@@ -168,18 +168,20 @@ void doubt_repeats(const cv::Mat& image, std::vector<std::string>& doubts) {
     cv::transpose(some, transposed);
     const Repeats columns = repeats_of(transposed);
     const double high = 1 / (1 - rows.share), wide = 1 / (1 - columns.share);
-    if (std::min(rows.share, columns.share) > least_share && std::max(high, wide) < alike * std::min(high, wide))
-        doubts.push_back(fmt::format("pixels are copies of their neighbours, as of an image that was enlarged {:.2g} "
-                                     "times: the steps between them occlude. Reduce it and its camera to about {}x{}, "
-                                     "without interpolation.",
-                                     (high + wide) / 2, std::lround(image.cols / wide),
-                                     std::lround(image.rows / high)));
-    else if (rows.every != columns.every)
-        doubts.push_back(fmt::format("every {} {} repeats the one before it, and {} do not: the image was stretched, "
-                                     "or lines were lost.",
-                                     ordinal(std::max(rows.every, columns.every)),
-                                     rows.every > columns.every ? "row" : "column",
-                                     rows.every > columns.every ? "columns" : "rows"));
+    const double share = std::min(rows.share, columns.share);
+    const bool enlarged = share > least_share && std::max(high, wide) < alike * std::min(high, wide);
+    add_finding(findings, Check::enlarged_image, share, least_share, enlarged, [&] {
+        return fmt::format("pixels are copies of their neighbours, as of an image that was enlarged {:.2g} times: the "
+                           "steps between them occlude. Reduce it and its camera to about {}x{}, without "
+                           "interpolation.",
+                           (high + wide) / 2, std::lround(image.cols / wide), std::lround(image.rows / high));
+    });
+    must_not(findings, Check::repeated_lines, !enlarged && rows.every != columns.every, [&] {
+        return fmt::format("every {} {} repeats the one before it, and {} do not: the image was stretched, or lines "
+                           "were lost.",
+                           ordinal(std::max(rows.every, columns.every)), rows.every > columns.every ? "row" : "column",
+                           rows.every > columns.every ? "columns" : "rows");
+    });
 }
 
 /// "mm: 2.10 m, tum: 0.42 m": the median under each preset for integers but the one in use.
@@ -241,17 +243,18 @@ int common_divisor(const cv::Mat& stored) {
 
 /// Sensors record steps of a millimetre, or finer ones. Multiples show that the values are in a finer unit than is
 /// assumed (a sensor's millimetres stored as TUM does: 5), or rotated bits (SUN RGB-D: 8).
-void doubt_steps(const cv::Mat& stored, const DepthEncoding& encoding, std::vector<std::string>& doubts) {
+void check_multiples(const cv::Mat& stored, const DepthEncoding& encoding, Findings& findings) {
     constexpr double largest_mm = 1.5;
     if ((encoding.stated && !encoding.by_hand) || stored.type() != CV_16UC1 ||
         encoding.kind != DepthEncoding::Kind::linear)
         return;
     const int divisor = common_divisor(stored);
-    if (const double step_mm = 1000 * divisor / encoding.units_per_metre; divisor > 1 && step_mm > largest_mm)
-        doubts.push_back(
-            fmt::format("nearly all depths are multiples of {:.2g} mm with encoding {} ({}), which is probably "
-                        "wrong.{}",
-                        step_mm, encoding.name, encoding.origin, what_others_give(stored, encoding)));
+    const double step_mm = divisor > 1 ? 1000 * divisor / encoding.units_per_metre : 0;
+    at_most(findings, Check::depth_multiples, step_mm, largest_mm, [&] {
+        return fmt::format("nearly all depths are multiples of {:.2g} mm with encoding {} ({}), which is probably "
+                           "wrong.{}",
+                           step_mm, encoding.name, encoding.origin, what_others_give(stored, encoding));
+    });
 }
 
 /// From next to zero to the largest number: depth that was stretched from its smallest to its largest value.
@@ -300,50 +303,57 @@ bool is_usual(const DepthEncoding& encoding, const cv::Mat& stored) {
 }
 
 /// `image`: depths of any kind, 0 = hole.
-std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& image, const cv::Mat& stored,
-                                      const DepthEncoding& encoding) {
+Findings findings_about(const Statistics& depth, const cv::Mat& image, const cv::Mat& stored,
+                        const DepthEncoding& encoding) {
     constexpr float nearest_median_m = 0.05F, farthest_median_m = 200, farthest_m = 1000;
     // If nobody named the encoding, but the layout or custom did, depth beyond an indoor sensor's range is worth a
     // warning, too. Floats may be of streets and halls; in centimetres or millimetres they are beyond these as well.
     constexpr float assumed_farthest_median_m = 12, floats_farthest_median_m = 40;
+    constexpr float most_jumps = 0.2F;
     if (depth.valid == 0) {
         if (depth.largest_m > 0)
             return {}; // a few pixels between those sampled
-        return {"no valid depth in this frame: every pixel is a hole."};
+        return {{Check::no_depth, 1, 0.5, "no valid depth in this frame: every pixel is a hole."}};
     }
+    Findings findings;
     if (encoding.arbitrary) { // any range may be right, and noise is no sign of another unit
-        std::vector<std::string> doubts;
-        if (depth.jumps > 0.2)
-            doubts.push_back(fmt::format("{:.0f} % of neighbouring depths differ by more than a fifth, which is noise "
-                                         "rather than surfaces.",
-                                         100 * depth.jumps));
-        return doubts;
+        at_most(findings, Check::depth_jumps, depth.jumps, most_jumps, [&] {
+            return fmt::format("{:.0f} % of neighbouring depths differ by more than a fifth, which is noise rather "
+                               "than surfaces.",
+                               100 * depth.jumps);
+        });
+        return findings;
     }
     const bool assumed = !encoding.stated;
     const float farthest_likely_m = !assumed && !is_usual(encoding, stored) ? farthest_median_m
                                     : stored.type() == CV_16UC1             ? assumed_farthest_median_m
                                                                             : floats_farthest_median_m;
     const std::string stated = fmt::format("encoding {} ({})", encoding.name, encoding.origin);
-    std::vector<std::string> doubts;
-    if (depth.jumps > 0.2)
-        doubts.push_back(fmt::format(
-            "{:.0f} % of neighbouring depths differ by more than a fifth, which is noise rather than surfaces; "
-            "{} is probably wrong.{}",
-            100 * depth.jumps, stated, what_others_give(stored, encoding)));
-    else if (depth.median_m < nearest_median_m || depth.median_m > farthest_likely_m || depth.largest_m > farthest_m)
-        doubts.push_back(fmt::format("a median depth of {:.3g} m and a largest of {:.3g} m are implausible with {}.{}",
-                                     depth.median_m, depth.largest_m, stated,
-                                     stored.type() == CV_16UC1 ? what_others_give(stored, encoding)
-                                                               : what_scales_give(depth.median_m, encoding)));
-    if (doubts.empty())
-        doubt_steps(stored, encoding, doubts);
+    at_most(findings, Check::depth_jumps, depth.jumps, most_jumps, [&] {
+        return fmt::format("{:.0f} % of neighbouring depths differ by more than a fifth, which is noise rather than "
+                           "surfaces; {} is probably wrong.{}",
+                           100 * depth.jumps, stated, what_others_give(stored, encoding));
+    });
+    // In units of the limit: 1 = as near, or as far, as is plausible.
+    const float range =
+        std::max({nearest_median_m / depth.median_m, depth.median_m / farthest_likely_m, depth.largest_m / farthest_m});
+    add_finding(findings, Check::median_depth, range, 1, range > 1 && !any_doubt(findings), [&] {
+        return fmt::format("a median depth of {:.3g} m and a largest of {:.3g} m are implausible with {}.{}",
+                           depth.median_m, depth.largest_m, stated,
+                           stored.type() == CV_16UC1 ? what_others_give(stored, encoding)
+                                                     : what_scales_give(depth.median_m, encoding));
+    });
+    if (!any_doubt(findings))
+        check_multiples(stored, encoding, findings);
     const auto largest = static_cast<float>(static_cast<double>(depth.largest_m) * encoding.units_per_metre);
-    if (doubts.empty() && assumed && is_stretched(stored, largest))
-        doubts.push_back(fmt::format("values fill the whole range of the file's numbers, as of depth stretched for "
-                                     "looking at: they are no lengths, whatever {} says.",
-                                     stated));
-    doubt_repeats(image, doubts);
-    return doubts;
+    if (!any_doubt(findings) && assumed)
+        must_not(findings, Check::stretched_depth, is_stretched(stored, largest), [&] {
+            return fmt::format("values fill the whole range of the file's numbers, as of depth stretched for looking "
+                               "at: they are no lengths, whatever {} says.",
+                               stated);
+        });
+    check_repeats(image, findings);
+    return findings;
 }
 
 /// The least and the largest of negative numbers, where there are no positive ones but backgrounds; else nothing.
@@ -378,15 +388,15 @@ DepthTable depth_table(const DepthEncoding& encoding) {
     return depth_in_metres(values, encoding);
 }
 
-std::vector<std::string> doubts_about(const cv::Mat1f& depth_m, const cv::Mat& stored, const DepthEncoding& encoding) {
-    return doubts_about(statistics_of(depth_m), depth_m, stored, encoding);
+Findings findings_about(const cv::Mat1f& depth_m, const cv::Mat& stored, const DepthEncoding& encoding) {
+    return findings_about(statistics_of(depth_m), depth_m, stored, encoding);
 }
 
-std::vector<std::string> doubts_about(const cv::Mat1w& stored, const DepthTable& table, float largest_m,
-                                      const DepthEncoding& encoding) {
+Findings findings_about(const cv::Mat1w& stored, const DepthTable& table, float largest_m,
+                        const DepthEncoding& encoding) {
     Statistics depth = statistics_of(stored, table);
     depth.largest_m = largest_m;
-    return doubts_about(depth, stored, stored, encoding);
+    return findings_about(depth, stored, stored, encoding);
 }
 
 } // namespace scanshade

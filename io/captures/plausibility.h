@@ -3,6 +3,7 @@
 #pragma once
 
 #include "io/images/image_file.h"
+#include "projection/base/finding.h"
 
 #include <opencv2/core.hpp>
 #include <string>
@@ -18,15 +19,14 @@ namespace scanshade {
 using DepthTable = cv::Mat1f;
 [[nodiscard]] DepthTable depth_table(const DepthEncoding& encoding);
 
-/// Sentences about what looks wrong in `depth_m` (decoded from `stored` with `encoding`): no valid depth, a range that
+/// What looks wrong in `depth_m` (decoded from `stored` with `encoding`): no valid depth, a range that
 /// no depth sensor has, noise in place of surfaces. Values that are all multiples, rows that are copies of others,
 /// and images that were enlarged by copying pixels.
-/// Each says what other encodings would give.
-[[nodiscard]] std::vector<std::string> doubts_about(const cv::Mat1f& depth_m, const cv::Mat& stored,
-                                                    const DepthEncoding& encoding);
+/// Doubts say what other encodings would give.
+[[nodiscard]] Findings findings_about(const cv::Mat1f& depth_m, const cv::Mat& stored, const DepthEncoding& encoding);
 
 /// The same without the image in metres. `largest_m`: of all pixels.
-[[nodiscard]] std::vector<std::string> doubts_about(const cv::Mat1w& stored, const DepthTable& table, float largest_m,
-                                                    const DepthEncoding& encoding);
+[[nodiscard]] Findings findings_about(const cv::Mat1w& stored, const DepthTable& table, float largest_m,
+                                      const DepthEncoding& encoding);
 
 } // namespace scanshade

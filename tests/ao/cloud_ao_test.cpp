@@ -119,7 +119,7 @@ TEST(CloudAo, a_room_without_normals_is_seen_from_inside) {
     for (const int seed : {1, 2}) {
         const auto cloud = scene::scene_cloud(world, 200000, seed);
         const auto found = visibility(cloud.points, {.radius = 0.5});
-        EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
+        EXPECT_TRUE(doubts_in(found.findings).empty()) << tests::joined(doubts_in(found.findings));
         const auto truth = scene::true_visibility(world, cloud, {.radius_m = 0.5, .rays = 256}, 8);
         EXPECT_LT(rms_between(found.visibility, truth), 0.12) << seed;
         for (std::size_t i = 0; i < found.normals.size(); ++i)
@@ -153,7 +153,7 @@ TEST(CloudAo, recorded_normals_are_taken_only_if_they_lie_on_the_planes) {
     const Points points = square(5000);
     const auto good = visibility(points, {}, Points(points.size(), Vector3d(0, 0, -1)));
     EXPECT_TRUE(any_note(good, "normals: recorded."));
-    EXPECT_TRUE(good.doubts.empty()) << tests::joined(good.doubts);
+    EXPECT_TRUE(doubts_in(good.findings).empty()) << tests::joined(doubts_in(good.findings));
     const auto bad = visibility(points, {}, Points(points.size(), Vector3d(1, 0, 0)));
     EXPECT_TRUE(any_note(bad, "recorded normals are not used"));
     EXPECT_GT(mean(bad.visibility), 0.99);
@@ -174,7 +174,7 @@ TEST(CloudAo, outside_as_given_turns_recorded_normals_too) {
         outward.push_back(p - Vector3d(1, 2, 3));
     const auto found = visibility(points, {.radius = 1, .outside = "inward"}, outward);
     EXPECT_NEAR(mean(found.visibility), 0.75, 0.02); // 1 - R^2 / 4 r^2
-    EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
+    EXPECT_TRUE(doubts_in(found.findings).empty()) << tests::joined(doubts_in(found.findings));
 }
 
 /// Noise of a fifth of the spacing made everything dark before it was measured.
@@ -215,7 +215,7 @@ TEST(CloudAo, the_expected_error_is_near_the_true_one) {
             ASSERT_TRUE(found.expected_error);
             EXPECT_LT(*found.expected_error, 2 * error) << name << ", " << points;
             EXPECT_GT(*found.expected_error, error / 2) << name << ", " << points;
-            EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
+            EXPECT_TRUE(doubts_in(found.findings).empty()) << tests::joined(doubts_in(found.findings));
         }
 }
 
@@ -263,8 +263,8 @@ TEST(CloudAo, a_scan_whose_normals_all_look_away_from_its_scanner_is_doubted) {
         inward[i] = -outward[i];
     }
     const auto towards = visibility(scan, {.radius = 0.5}, inward), away = visibility(scan, {.radius = 0.5}, outward);
-    EXPECT_TRUE(towards.doubts.empty()) << tests::joined(towards.doubts);
-    EXPECT_EQ(away.doubts.size(), 1);
+    EXPECT_TRUE(doubts_in(towards.findings).empty()) << tests::joined(doubts_in(towards.findings));
+    EXPECT_EQ(doubts_in(away.findings).size(), 1);
     EXPECT_GT(mean(away.visibility), 0.99) << "recorded normals are kept";
 }
 
@@ -339,7 +339,7 @@ TEST(CloudAo, tiles_change_hardly_anything) {
 TEST(CloudAo, tiles_agree_about_sides) {
     const auto found = visibility(sphere(250000, {10, 20, 30}), {.radius = 0.2, .memory_mib = 64});
     EXPECT_GE(found.tiles, 2);
-    EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
+    EXPECT_TRUE(doubts_in(found.findings).empty()) << tests::joined(doubts_in(found.findings));
     EXPECT_TRUE(any_note(found, "outward")) << tests::joined(found.notes);
     EXPECT_GT(mean(found.visibility), 0.99);
 }
@@ -517,14 +517,14 @@ TEST(CloudAo, noise_that_the_radius_is_too_small_to_tell_is_doubted) {
     const Points slab = square(60000, 0.02), up(slab.size(), Vector3d::UnitZ()); // 8 mm apart
     const auto left = [&](double radius) {
         const auto found = visibility(slab, {.radius = radius}, up);
-        return std::ranges::any_of(found.doubts, [](const std::string& doubt) {
+        return std::ranges::any_of(doubts_in(found.findings), [](const std::string& doubt) {
             return doubt.find("larger than the spacing of the points is left") != doubt.npos;
         });
     };
     EXPECT_TRUE(left(0.08));
     EXPECT_FALSE(left(0.5)) << "as the doubt advises";
     const auto exact = visibility(square(60000), {.radius = 0.08}, up);
-    EXPECT_TRUE(exact.doubts.empty()) << tests::joined(exact.doubts);
+    EXPECT_TRUE(doubts_in(exact.findings).empty()) << tests::joined(doubts_in(exact.findings));
 }
 
 TEST(CloudAo, rings_of_a_spinning_lidar_are_doubted) {
@@ -538,10 +538,10 @@ TEST(CloudAo, rings_of_a_spinning_lidar_are_doubted) {
         }
     }
     const auto found = visibility(rings, {.radius = 0.5});
-    EXPECT_TRUE(std::ranges::any_of(found.doubts, [](const auto& doubt) {
+    EXPECT_TRUE(std::ranges::any_of(doubts_in(found.findings), [](const auto& doubt) {
         return doubt.find("on a line") != doubt.npos;
-    })) << tests::joined(found.doubts);
-    for (const std::string& doubt : visibility(corner(20000), {.radius = 0.5}).doubts)
+    })) << tests::joined(doubts_in(found.findings));
+    for (const std::string& doubt : doubts_in(visibility(corner(20000), {.radius = 0.5}).findings))
         EXPECT_EQ(doubt.find("on a line"), doubt.npos) << doubt;
 }
 

@@ -209,13 +209,14 @@ std::vector<CloudErrorSample> samples_of(const char* name, int number) {
 }
 
 TEST(CloudErrors, a_large_error_is_said_and_a_very_large_one_by_the_check_alone_is_a_reason_to_doubt) {
-    EXPECT_FALSE(told_error(0.05, 0.05).doubt);
-    EXPECT_FALSE(told_error(0.2, 0.05).doubt) << "precision is a property of the result";
-    EXPECT_FALSE(told_error(0.2, 0.25).doubt) << "what is said to be imprecise is not contradicted by the check";
+    EXPECT_EQ(told_error(0.05, 0.05).by_part.sentence, "");
+    EXPECT_EQ(told_error(0.2, 0.05).by_part.sentence, "") << "precision is a property of the result";
+    EXPECT_EQ(told_error(0.2, 0.35).by_part.sentence, "")
+        << "what is said to be imprecise is not contradicted by the check";
     EXPECT_TRUE(told_error(0.2, 0.05).note.starts_with("an error of 0.20 RMS is expected"));
-    EXPECT_FALSE(told_error(0.05, 0.2).doubt) << "noise may do that";
-    ASSERT_TRUE(told_error(0.05, 0.25).doubt) << "the factors have not seen every kind of cloud";
-    EXPECT_TRUE(told_error(0.05, 0.25).doubt->starts_with("a part of the points"));
+    EXPECT_EQ(told_error(0.05, 0.26).by_part.sentence, "") << "noise may do that";
+    ASSERT_NE(told_error(0.05, 0.35).by_part.sentence, "") << "the factors have not seen every kind of cloud";
+    EXPECT_TRUE(told_error(0.05, 0.35).by_part.sentence.starts_with("a part of the points"));
 }
 
 /// The README has more scenes and noise, and closer bounds.

@@ -127,8 +127,8 @@ TEST_F(CloudGpuTest, recorded_sides_of_many_points_are_judged_as_on_the_processo
         for (std::size_t i = 0; i < cloud.points.size(); ++i)
             other_sides += here.normals[i].dot(there.normals[i]) < 0;
         EXPECT_EQ(other_sides, 0U);
-        EXPECT_EQ(here.doubts, there.doubts);
-        EXPECT_EQ(here.doubts.empty(), normals == &cloud.normals);
+        EXPECT_EQ(doubts_in(here.findings), doubts_in(there.findings));
+        EXPECT_EQ(doubts_in(here.findings).empty(), normals == &cloud.normals);
     }
 }
 

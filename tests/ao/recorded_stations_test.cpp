@@ -69,7 +69,7 @@ double wrong_sides(const PointVisibility& found, const scene::SceneCloud& cloud)
 }
 
 std::string said(const PointVisibility& found) {
-    return fmt::format("{} {}", fmt::join(found.notes, " "), fmt::join(found.doubts, " "));
+    return fmt::format("{} {}", fmt::join(found.notes, " "), fmt::join(doubts_in(found.findings), " "));
 }
 
 class RecordedStationsOf : public testing::TestWithParam<const char*> {};
@@ -82,7 +82,7 @@ TEST_P(RecordedStationsOf, decide_sides_at_least_as_well_as_the_cloud_itself) {
     EXPECT_LE(wrong_sides(with, cloud), wrong_sides(without_stations(GetParam()), cloud) + 0.0005);
     EXPECT_TRUE(says(said(with), "turned to the position that each point was seen from"));
     EXPECT_TRUE(says(said(with), "of the points can be seen from the position of their scan"));
-    EXPECT_TRUE(with.doubts.empty()) << said(with);
+    EXPECT_TRUE(doubts_in(with.findings).empty()) << said(with);
 }
 
 TEST_P(RecordedStationsOf, leave_right_normals_alone_and_turn_inverted_ones) {
@@ -196,11 +196,12 @@ TEST(RecordedStations, decide_what_the_cloud_cannot) {
         box.normals.push_back(normal);
     }
     box.starts = {0, 30000};
-    EXPECT_FALSE(computed(box, {}).doubts.empty());
+    EXPECT_FALSE(doubts_in(computed(box, {}).findings).empty());
     const PointVisibility found = computed(box, {{10.4, 19.7, 5.1}, {9.3, 20.5, 4.8}});
-    EXPECT_TRUE(found.doubts.empty()) << said(found);
+    EXPECT_TRUE(doubts_in(found.findings).empty()) << said(found);
     EXPECT_LT(wrong_sides(found, box), 0.001);
-    EXPECT_FALSE(computed(box, {{90, 40, 25}, {-70, 10, 25}}).doubts.empty()) << "not all of it is seen from there";
+    EXPECT_FALSE(doubts_in(computed(box, {{90, 40, 25}, {-70, 10, 25}}).findings).empty())
+        << "not all of it is seen from there";
 }
 
 } // namespace

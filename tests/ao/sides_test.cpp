@@ -170,11 +170,12 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& info) { return info.param.name; });
 
 /// What is doubted, but for an error that so few points make plausible.
-std::string doubts_of_sides(PointVisibility found) {
-    std::erase_if(found.doubts, [](const std::string& doubt) {
+std::string doubts_of_sides(const PointVisibility& found) {
+    std::vector<std::string> doubts = doubts_in(found.findings);
+    std::erase_if(doubts, [](const std::string& doubt) {
         return doubt.starts_with("an error of") || doubt.starts_with("a part of the points");
     });
-    return tests::joined(found.doubts);
+    return tests::joined(doubts);
 }
 
 class Scans : public testing::TestWithParam<const char*> {};
@@ -264,18 +265,18 @@ TEST(Sides, an_empty_box_could_be_either) {
         p[i % 3] = i % 2 ? 1 : -1;
         box.push_back(p.cwiseProduct(Vector3d(2, 1.5, 1)) + Vector3d(10, 20, 5));
     }
-    EXPECT_FALSE(visibility(box).doubts.empty());
+    EXPECT_FALSE(doubts_in(visibility(box).findings).empty());
     for (const bool within : {true, false}) { // a sweep's scanner decides
         const Vector3d scanner = within ? Vector3d(10.4, 19.7, 5.1) : Vector3d(90, 40, 25);
         const auto swept = CloudAo({.radius = 0.5}).compute({box, {}, {}, false, true}, scanner);
         if (within) {
-            EXPECT_TRUE(swept.doubts.empty()) << tests::joined(swept.doubts);
+            EXPECT_TRUE(doubts_in(swept.findings).empty()) << tests::joined(doubts_in(swept.findings));
             EXPECT_GT(swept.normals[1].cast<double>().dot(scanner - box[1]), 0);
         } else {
-            EXPECT_FALSE(swept.doubts.empty()) << "not all of it is seen from there";
+            EXPECT_FALSE(doubts_in(swept.findings).empty()) << "not all of it is seen from there";
         }
     }
-    EXPECT_TRUE(visibility(box, {}, {.radius = 0.5, .outside = "inward"}).doubts.empty());
+    EXPECT_TRUE(doubts_in(visibility(box, {}, {.radius = 0.5, .outside = "inward"}).findings).empty());
 }
 
 TEST(Sides, round_bodies_are_seen_from_outside) {
@@ -299,7 +300,7 @@ TEST(Sides, round_bodies_are_seen_from_outside) {
         inward += outside < 0;
     }
     EXPECT_LT(inward, 0.01 * static_cast<double>(snowman.size()));
-    EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
+    EXPECT_TRUE(doubts_in(found.findings).empty()) << tests::joined(doubts_in(found.findings));
 }
 
 /// The faces of boxes that stand on each other, without what lies within another one; normals look out.

@@ -115,19 +115,19 @@ TEST_F(Voxels, a_level_without_room_is_said) {
         const MethodRemarks& remarks = method.remarks();
         SCOPED_TRACE(mib);
         warned += remarks.warnings.size();
-        doubted += remarks.doubts.size();
-        silent += remarks.warnings.empty() && remarks.doubts.empty();
-        EXPECT_LE(remarks.warnings.size() + remarks.doubts.size(), 1U);
+        doubted += doubts_in(remarks.findings).size();
+        silent += remarks.warnings.empty() && doubts_in(remarks.findings).empty();
+        EXPECT_LE(remarks.warnings.size() + doubts_in(remarks.findings).size(), 1U);
         for (const std::string& sentence : remarks.warnings)
             EXPECT_TRUE(says(sentence, fmt::format("{} MiB are there", mib - 1)) ||
                         says(sentence, fmt::format("{} MiB are there", mib)))
                 << sentence;
         if (mib == 1) {
-            EXPECT_EQ(remarks.doubts.size(), 1U) << "115 bricks";
+            EXPECT_EQ(doubts_in(remarks.findings).size(), 1U) << "115 bricks";
         }
         if (mib == 256) {
             EXPECT_LT(mean_difference(values, visibility(depth, options)), 1e-6);
-            EXPECT_TRUE(remarks.warnings.empty() && remarks.doubts.empty());
+            EXPECT_TRUE(remarks.warnings.empty() && doubts_in(remarks.findings).empty());
         }
     }
     EXPECT_GE(warned, 1U);
@@ -144,14 +144,14 @@ TEST_F(Voxels, the_memory_that_is_named_is_enough) {
     Vxao little(device, options);
     (void)little.compute({depth});
     std::vector<std::string> said = little.remarks().warnings;
-    std::ranges::copy(little.remarks().doubts, std::back_inserter(said));
+    std::ranges::copy(doubts_in(little.remarks().findings), std::back_inserter(said));
     ASSERT_EQ(said.size(), 1U);
     double needed_mib = 0;
     ASSERT_EQ(std::sscanf(said[0].substr(said[0].find("some ")).c_str(), "some %lf MiB", &needed_mib), 1) << said[0];
     options.memory_mib = static_cast<int>(1.1 * needed_mib) + 1;
     Vxao enough(device, options);
     (void)enough.compute({depth});
-    EXPECT_TRUE(enough.remarks().warnings.empty() && enough.remarks().doubts.empty()) << said[0];
+    EXPECT_TRUE(enough.remarks().warnings.empty() && doubts_in(enough.remarks().findings).empty()) << said[0];
 }
 
 TEST_F(Voxels, a_voxel_out_of_range_is_refused) {

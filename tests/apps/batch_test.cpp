@@ -326,8 +326,9 @@ TEST_F(BatchTest, a_frame_of_holes_is_a_doubtful_result) {
     const auto rows = run_batch(recorded, method, all_frames(recorded, folder / "out"));
     EXPECT_EQ(rows[0].status, FrameStatus::doubtful) << rows[0].why;
     EXPECT_EQ(rows[0].coverage, 0);
-    ASSERT_EQ(rows[0].doubts.size(), 1U) << "one reason, said once";
-    EXPECT_NE(rows[0].doubts[0].find("every pixel is a hole"), std::string::npos) << rows[0].doubts[0];
+    ASSERT_EQ(doubts_in(rows[0].findings).size(), 1U) << "one reason, said once";
+    EXPECT_NE(doubts_in(rows[0].findings)[0].find("every pixel is a hole"), std::string::npos)
+        << doubts_in(rows[0].findings)[0];
 }
 
 TEST_F(BatchTest, the_table_quotes_what_would_break_it) {

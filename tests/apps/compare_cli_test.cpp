@@ -47,6 +47,18 @@ TEST_F(MeasureTest, truth_is_found_from_the_run_or_in_the_capture) {
     EXPECT_NEAR(read(folder / "out/compare.json")["total"]["rms"].get<double>(), total(images, {}).rms, 1e-6);
 }
 
+TEST_F(MeasureTest, a_cloud_is_compared_with_its_truth_point_by_point) {
+    const std::string cloud = (folder / "cloud").string();
+    ASSERT_EQ(run_program(fmt::format("generate office --cloud 5000 -o {}", cloud)).exit_code, 0);
+    ASSERT_EQ(run_program(fmt::format("run {} -o {} --write cloud --page no --radius 0.5", cloud, out())).exit_code, 0);
+    const Ran found = run_program(fmt::format("compare {} --truth --json", out()));
+    ASSERT_EQ(found.exit_code, 0) << found.err;
+    const json total = json::parse(found.out)["total"];
+    EXPECT_GT(total["pixels"].get<double>(), 4900);
+    EXPECT_LT(total["rms"].get<double>(), 0.2);
+    EXPECT_GT(total["correlation"].get<double>(), 0.5);
+}
+
 TEST_F(MeasureTest, errors_by_confidence_share_out_all_pixels) {
     ASSERT_EQ(run_program(fmt::format("compare {} --truth -o {}", made(), out())).exit_code, 0);
     const json report = read(folder / "out/compare.json");

@@ -1,8 +1,10 @@
 // A result that is implausible is doubtful, with reasons, wherever the result is told; a plausible one is not.
+#include "apps/doubts/checks.h"
 #include "apps/frame/frame_steps.h"
 #include "apps/walk/batch.h"
 #include "io/cameras/camera_file.h"
 #include "io/images/image_file.h"
+#include "projection/base/error.h"
 #include "tests/support/files.h"
 #include "tests/support/small_capture.h"
 
@@ -40,7 +42,10 @@ struct Computed {
         work.ao.visibility = cv::Mat1f(work.depth.z_m.size(), 0.5F);
     }
     [[nodiscard]] std::vector<std::string> doubts() const {
-        return doubts_about(computed_frame(work), radius_m, noise);
+        return doubts_in(findings_about(computed_frame(work), radius_m, noise));
+    }
+    [[nodiscard]] std::vector<std::string> warnings() const {
+        return warnings_in(findings_about(computed_frame(work), radius_m, noise));
     }
 };
 
@@ -73,10 +78,11 @@ TEST(doubts, few_pixels_with_a_depth_or_a_value) {
         for (int u = 0; u < whole.cols; ++u)
             if ((7 * u + 13 * v) % 5 != 0)
                 few.work.depth.z_m(v, u) = 0;
-    EXPECT_TRUE(warned(few.doubts(), "only 19.0 % of the pixels hold a depth"));
+    EXPECT_TRUE(warned(few.warnings(), "only 19.0 % of the pixels hold a depth"));
+    EXPECT_TRUE(few.doubts().empty()) << "holes cost precision";
     few.work.depth.z_m = whole;
     few.row.valid_share = 0.21;
-    EXPECT_TRUE(few.doubts().empty());
+    EXPECT_TRUE(few.warnings().empty());
     few.row.coverage = 0.1;
     EXPECT_TRUE(warned(few.doubts(), "only 10.0 % of the valid pixels got a value"));
     few.row.valid_share = 0;
@@ -90,14 +96,16 @@ TEST(doubts, an_object_cut_out_of_its_background_is_no_reason) {
     z.colRange(0, z.cols / 2).setTo(0);
     z.rowRange(0, z.rows / 2).setTo(0);
     EXPECT_TRUE(object.doubts().empty()) << tests::joined(object.doubts());
+    EXPECT_TRUE(object.warnings().empty()) << tests::joined(object.warnings());
 }
 
 TEST(doubts, noise_as_large_as_the_radius) {
     Computed noisy;
     noisy.noise = {0.01, 0.002}; // a Kinect's at such distances
-    EXPECT_TRUE(noisy.doubts().empty()) << tests::joined(noisy.doubts());
+    EXPECT_TRUE(noisy.warnings().empty()) << tests::joined(noisy.warnings());
     noisy.radius_m = 0.05;
-    EXPECT_TRUE(warned(noisy.doubts(), "noise is above a quarter of the radius"));
+    EXPECT_TRUE(warned(noisy.warnings(), "noise is above a quarter of the radius"));
+    EXPECT_TRUE(noisy.doubts().empty()) << "noise costs precision";
 }
 
 TEST(doubts, depths_in_steps_that_the_radius_feels) {
@@ -276,6 +284,41 @@ TEST_F(DoubtfulRun, is_told_by_messages_table_and_manifest_and_by_the_exit_code_
     EXPECT_EQ(manifest["frames"][2]["doubts"].size(), 1)
         << "the patches are flat, so every value is exactly 1, as it should";
     EXPECT_FALSE(manifest["frames"][1].contains("doubts"));
+}
+
+/// Numbers that are within their limits are as good a measurement as those that are not.
+TEST_F(DoubtfulRun, writes_what_every_check_found) {
+    ASSERT_EQ(run("--write ao").exit_code, 0);
+    const json checks = json::parse(read_bytes(folder / "out/checks.json"));
+    EXPECT_EQ(checks["checks"].size(), all_checks().size());
+    ASSERT_EQ(checks["frames"].size(), 4U);
+    for (const json& frame : checks["frames"]) {
+        const auto holes =
+            std::ranges::find_if(frame["found"], [](const json& each) { return each["check"] == "holes"; });
+        ASSERT_NE(holes, frame["found"].end()) << frame;
+        const bool scattered = frame["name"] == "002";
+        EXPECT_EQ((*holes)["doubtful"], scattered);
+        EXPECT_EQ((*holes)["limit"], 0.2);
+        EXPECT_NEAR((*holes)["value"].get<double>(), scattered ? 256.0 / (48 * 64) : 1, scattered ? 1e-5 : 0.1);
+        const auto doubts =
+            std::ranges::count_if(frame["found"], [](const json& each) { return bool(each["doubtful"]); });
+        EXPECT_EQ(doubts, scattered ? 1 : 0);
+        EXPECT_GT(frame["found"].size(), 10U) << frame;
+    }
+}
+
+TEST(checks, are_listed_by_help_and_in_the_readme) {
+    const std::string printed = run_program("help checks --markdown").out;
+    EXPECT_EQ(printed, checks_markdown());
+    const std::string readme = read_bytes(fs::path(SCANSHADE_SOURCE) / "apps/doubts/README.md");
+    EXPECT_NE(readme.find(printed), std::string::npos) << "README.md has another table than `scanshade help checks "
+                                                          "--markdown`";
+    const std::string listed = run_program("help checks").out;
+    for (const CheckRow& row : all_checks()) {
+        EXPECT_EQ(check_named(row.name), row.check);
+        EXPECT_NE(listed.find(row.name), std::string::npos) << row.name;
+    }
+    EXPECT_THROW((void)check_named("nothing"), Error);
 }
 
 TEST_F(DoubtfulRun, is_done_and_stays_doubtful_when_resumed) {

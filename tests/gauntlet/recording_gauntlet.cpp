@@ -1,9 +1,11 @@
 // Recordings, real and generated, each perturbed in every way of a table: where is the result of `scanshade run` wrong
 // without a word?
+#include "apps/doubts/checks.h"
 #include "io/captures/capture.h"
 #include "io/images/image_file.h"
 #include "projection/base/stopwatch.h"
 #include "projection/project.h"
+#include "tests/gauntlet/check_rows.h"
 #include "tests/gauntlet/perturb_recordings.h"
 #include "tests/support/data.h"
 
@@ -154,6 +156,7 @@ struct Outcome {
     Maps visibility;
     std::map<std::string, int> frames;  ///< by status
     std::vector<std::string> sentences; ///< errors, doubts and warnings; the copy's name is left out
+    Findings findings;                  ///< of all frames
     [[nodiscard]] std::size_t count() const {
         std::size_t all = 0;
         for (const auto& [status, number] : frames)
@@ -194,6 +197,13 @@ Outcome outcome_of(const fs::path& home, const std::string& name) {
         if (const fs::path map = out / "ao" / (frame_name + ".png"); fs::exists(map))
             outcome.visibility[frame_name] = read_ao(map);
     }
+    const json checks = json::parse(std::ifstream(out / "checks.json"));
+    for (const json& frame : checks.at("frames"))
+        for (const json& each : frame.at("found"))
+            outcome.findings.push_back({check_named(each.at("check").get<std::string>()),
+                                        each.at("value").is_number() ? each["value"].get<double>() : NAN,
+                                        each.at("limit").is_number() ? each["limit"].get<double>() : NAN,
+                                        each.at("doubtful").get<bool>() ? "doubtful" : ""});
     add(manifest.value("warnings", json::array()));
     add(manifest.at("capture").value("warnings", json::array()));
     return outcome;
@@ -315,7 +325,14 @@ class Gauntlet {
         const bool all_ok = outcome.frames.size() == 1 && outcome.frames.contains("ok");
         // What comes no farther from the truth is not wrong, however it differs. Lost frames are wrong, too.
         const bool moved = !(rms <= largest_rms) && !(error <= plain_error + hardly_any_rms);
-        const bool silent = all_ok && sentences.empty() && (moved || outcome.count() < plain.count());
+        const bool wrong = moved || outcome.count() < plain.count();
+        const bool silent = all_ok && sentences.empty() && wrong;
+        if (outcome.count() == outcome.visibility.size()) // what is refused or failed has no checks
+            write_checks(recording.name, std::string(row.name),
+                         is_plain ? RowKind::valid
+                         : wrong  ? RowKind::wrong
+                                  : RowKind::harmless,
+                         outcome.findings);
         const std::string line = fmt::format("{:<34} {:<17} {:>6.3f} {:>6}  {:<22} {}", recording.name, row.name, rms,
                                              std::isnan(error) ? "" : fmt::format("{:.3f}", error),
                                              fmt::join(statuses, ", "), sentences.empty() ? "" : sentences.front());

@@ -119,7 +119,7 @@ std::vector<std::string> warnings_of(const fs::path& path) {
     for (std::size_t i = 0; i < capture.entries.size(); ++i) {
         const Frame frame = capture.load(i);
         warnings.insert(warnings.end(), frame.warnings.begin(), frame.warnings.end());
-        warnings.insert(warnings.end(), frame.doubts.begin(), frame.doubts.end());
+        std::ranges::copy(doubts_in(frame.findings), std::back_inserter(warnings));
     }
     return warnings;
 }

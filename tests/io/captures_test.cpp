@@ -278,11 +278,11 @@ TEST(captures, a_wrong_depth_scale_is_doubted_with_the_alternatives) {
     const cv::Mat1f far_wall(2.0 * wall() + 1.0);
     write_depth_png(folder / "d.png", far_wall, 5000); // TUM's unit, read as millimetres: 15 to 25 m
     const Frame frame = open_capture(folder / "d.png").load(0);
-    EXPECT_TRUE(warned(frame.doubts, "implausible"));
-    EXPECT_TRUE(warned(frame.doubts, "tum a median of"));
+    EXPECT_TRUE(warned(doubts_in(frame.findings), "implausible"));
+    EXPECT_TRUE(warned(doubts_in(frame.findings), "tum a median of"));
     CaptureOptions right;
     right.depth_scale = "tum";
-    EXPECT_FALSE(warned(open_capture(folder / "d.png", right).load(0).doubts, "implausible"));
+    EXPECT_FALSE(warned(doubts_in(open_capture(folder / "d.png", right).load(0).findings), "implausible"));
 }
 
 TEST(captures, noise_in_place_of_surfaces_is_doubted) {
@@ -292,7 +292,7 @@ TEST(captures, noise_in_place_of_surfaces_is_doubted) {
     for (auto& value : noise)
         value = static_cast<ushort>(random.uniform(500, 9000));
     cv::imwrite((folder / "d.png").string(), noise);
-    EXPECT_TRUE(warned(open_capture(folder / "d.png").load(0).doubts, "noise"));
+    EXPECT_TRUE(warned(doubts_in(open_capture(folder / "d.png").load(0).findings), "noise"));
 }
 
 TEST(captures, colour_of_another_size_is_left_out_and_depth_stays) {

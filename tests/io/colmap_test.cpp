@@ -72,7 +72,7 @@ TEST_F(Colmap, depth_is_measured_by_the_scene_so_the_unit_cancels) {
         EXPECT_TRUE(capture.depth.arbitrary);
         EXPECT_EQ(capture.median_depth, usual_median_depth);
         frames.push_back(capture.load(1));
-        EXPECT_TRUE(frames.back().doubts.empty()) << tests::joined(frames.back().doubts);
+        EXPECT_TRUE(doubts_in(frames.back().findings).empty()) << tests::joined(doubts_in(frames.back().findings));
         EXPECT_LT(cv::norm(frames.back().depth_m, frames.front().depth_m, cv::NORM_INF), 1e-5);
         EXPECT_NEAR(frames.back().world_from_camera->translation().x(),
                     frames.front().world_from_camera->translation().x(), 1e-7);

@@ -42,7 +42,7 @@ TEST_P(GoodCapture, holds_what_its_readme_says) {
         EXPECT_EQ(frame.colour.size(), cv::Size(640, 480));
         EXPECT_EQ(frame.world_from_camera.has_value(), good.poses);
         EXPECT_TRUE(frame.warnings.empty()) << joined(frame.warnings);
-        EXPECT_TRUE(frame.doubts.empty()) << joined(frame.doubts);
+        EXPECT_TRUE(doubts_in(frame.findings).empty()) << joined(doubts_in(frame.findings));
         const double holes = 1 - cv::countNonZero(frame.depth_m) / (640.0 * 480.0);
         double nearest = 0, farthest = 0;
         cv::minMaxLoc(frame.depth_m, &nearest, &farthest, nullptr, nullptr, frame.depth_m > 0);
@@ -82,13 +82,13 @@ TEST(good_data, single_depth_images_need_their_encoding_and_doubt_the_wrong_one)
         options.depth_scale = row.scale;
         const Frame right = open_capture(folder / row.file, options).load(0);
         EXPECT_TRUE(right.warnings.empty()) << joined(right.warnings);
-        EXPECT_TRUE(right.doubts.empty()) << joined(right.doubts);
+        EXPECT_TRUE(doubts_in(right.findings).empty()) << joined(doubts_in(right.findings));
         double nearest = 0, farthest = 0;
         cv::minMaxLoc(right.depth_m, &nearest, &farthest, nullptr, nullptr, right.depth_m > 0);
         EXPECT_GE(nearest, row.nearest_m) << row.file;
         EXPECT_LE(farthest, row.farthest_m) << row.file;
         EXPECT_NEAR(1 - cv::countNonZero(right.depth_m) / 307200.0, row.holes, 0.001) << row.file;
-        EXPECT_TRUE(warned(open_capture(folder / row.file).load(0).doubts, "--depth-scale")) << row.file;
+        EXPECT_TRUE(warned(doubts_in(open_capture(folder / row.file).load(0).findings), "--depth-scale")) << row.file;
     }
 }
 

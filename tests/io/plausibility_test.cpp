@@ -28,7 +28,7 @@ cv::Mat1w times(cv::Mat1w stored, int factor) {
 }
 
 std::vector<std::string> doubts(const cv::Mat1w& stored, const DepthEncoding& encoding = depth_encoding("mm", "test")) {
-    return doubts_about(depth_in_metres(stored, encoding), stored, encoding);
+    return doubts_in(findings_about(depth_in_metres(stored, encoding), stored, encoding));
 }
 
 TEST(plausibility, a_layouts_usual_unit_is_doubted_beyond_an_indoor_sensors_range) {
@@ -85,7 +85,7 @@ TEST(plausibility, floats_in_millimetres_are_told_with_the_scale_that_suits_them
     cv::Mat1f millimetres;
     waves().convertTo(millimetres, CV_32F);
     const DepthEncoding metres = usual_encoding("m", "assumed: floats are metres");
-    const auto told = doubts_about(depth_in_metres(millimetres, metres), millimetres, metres);
+    const auto told = doubts_in(findings_about(depth_in_metres(millimetres, metres), millimetres, metres));
     EXPECT_TRUE(warned(told, "With --depth-scale 1000 the median is 2.")) << tests::joined(told);
 }
 
@@ -178,22 +178,24 @@ TEST(plausibility, numbers_for_looking_at_are_no_lengths) {
     cv::Mat1f shares;
     cv::normalize(waves(), shares, 0, 1, cv::NORM_MINMAX, CV_32F);
     const DepthEncoding metres = usual_encoding("m", "assumed: floats are metres");
-    EXPECT_TRUE(warned(doubts_about(depth_in_metres(shares, metres), shares, metres), "fill the whole range"));
+    EXPECT_TRUE(
+        warned(doubts_in(findings_about(depth_in_metres(shares, metres), shares, metres)), "fill the whole range"));
     cv::Mat1f divided; // by its largest value
     cv::normalize(waves(), divided, 1, 0, cv::NORM_INF, CV_32F);
-    EXPECT_TRUE(warned(doubts_about(depth_in_metres(divided, metres), divided, metres), "fill the whole range"));
+    EXPECT_TRUE(
+        warned(doubts_in(findings_about(depth_in_metres(divided, metres), divided, metres)), "fill the whole range"));
     divided.colRange(0, 20) = 1; // a wall at one metre
-    EXPECT_TRUE(doubts_about(depth_in_metres(divided, metres), divided, metres).empty());
+    EXPECT_TRUE(doubts_in(findings_about(depth_in_metres(divided, metres), divided, metres)).empty());
     cv::Mat1f near; // to 1.5 m
     shares.convertTo(near, CV_32F, 1, 0.5);
-    EXPECT_TRUE(doubts_about(depth_in_metres(near, metres), near, metres).empty());
+    EXPECT_TRUE(doubts_in(findings_about(depth_in_metres(near, metres), near, metres)).empty());
 }
 
 TEST(plausibility, halls_and_streets_in_floats_are_not_doubted) {
     const DepthEncoding metres = usual_encoding("m", "assumed: floats are metres");
     cv::Mat1f hall;
     waves().convertTo(hall, CV_32F, 0.01); // 25 m
-    EXPECT_TRUE(doubts_about(depth_in_metres(hall, metres), hall, metres).empty());
+    EXPECT_TRUE(doubts_in(findings_about(depth_in_metres(hall, metres), hall, metres)).empty());
 }
 
 } // namespace

@@ -44,7 +44,7 @@ struct Decision {
     std::string why{};
     double explained = 0;
     bool sure = false;
-    std::optional<std::string> doubt{};
+    std::optional<Finding> finding{};
 };
 
 /// What decides between a labelling and its opposite.
@@ -109,30 +109,36 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
             decision.why = "to the outer side of a shell";
         const bool like_room = boxed > walled || within > std::max(scanned_within, outside);
         const bool too_low = empty_within && scene.smallest < lowest_room; // for a room without a gap
-        if (room ? !sure_room : !body || (like_room && !too_low))
-            decision.doubt = fmt::format("both sides of all surfaces could be the scanned one, as of a room and of a "
-                                         "body of its shape: the {} one was taken; --cloud.outside sets it.",
-                                         room ? "inner" : "outer");
-        decision.sure = !decision.doubt;
+        decision.sure = room ? sure_room : body && (!like_room || too_low);
+        decision.finding = {Check::room_or_body, decision.sure ? 0.0 : 1.0, 0.5, {}};
+        if (!decision.sure)
+            decision.finding->doubt = fmt::format("both sides of all surfaces could be the scanned one, as of a room "
+                                                  "and of a body of its shape: the {} one was taken; --cloud.outside "
+                                                  "sets it.",
+                                                  room ? "inner" : "outer");
     } else {
         decision.sign = covered;
         decision.why = "to where a scanner could stand: " + explained(covered);
         const bool sure_body = covered == -inner && afar > 0.97 && boxed < hardly_walled;
-        if (margin < near_tie && !sure_body && !(covered == inner && boxed > walled))
-            decision.doubt = fmt::format("the other side of all surfaces explains the cloud nearly as well ({:.0f} % "
-                                         "against {:.0f} %); --cloud.outside sets it.",
-                                         100 * shares[at(-covered)], 100 * shares[at(covered)]);
+        const bool known_otherwise = sure_body || (covered == inner && boxed > walled);
+        decision.finding = {Check::both_sides, margin, near_tie, {}};
+        if (margin < near_tie && !known_otherwise)
+            decision.finding->doubt =
+                fmt::format("the other side of all surfaces explains the cloud nearly as well ({:.0f} % against {:.0f} "
+                            "%); --cloud.outside sets it.",
+                            100 * shares[at(-covered)], 100 * shares[at(covered)]);
         else if (!scene.up_known && shares[at(covered)] < hardly_explained)
-            decision.doubt = fmt::format("the places where a scanner could have stood see only {:.0f} % of the points "
-                                         "from the front, as among plants; --cloud.outside sets the side.",
-                                         100 * shares[at(covered)]);
+            decision.finding = {Check::fronts_explained, shares[at(covered)], hardly_explained,
+                                fmt::format("the places where a scanner could have stood see only {:.0f} % of the "
+                                            "points from the front, as among plants; --cloud.outside sets the side.",
+                                            100 * shares[at(covered)])};
     }
     decision.chosen = covers[at(decision.sign)].chosen;
     decision.explained = shares[at(decision.sign)];
     if (scene.up_known && rule != SidesRule::outward && rule != SidesRule::inward && !decision.body &&
         shares[at(decision.sign)] < 0.6) {
         decision.lost = true;
-        decision.doubt.reset();
+        decision.finding.reset();
         decision.why = "up, since no place of a scanner explains most of the surfaces (as among plants)";
     }
     return decision;
@@ -314,7 +320,7 @@ Sides sides_of(const CloudSurface& surface, const Patches& patches, const DiscRa
         return {all, facing(surface, patches, all, up.value_or(Vector3f::UnitZ())), {}, {}};
     }();
     sides.why = decision.why;
-    sides.doubt = decision.doubt;
+    sides.finding = decision.finding;
     sides.sure = decision.sure;
     if (as_given) {
         sides.explained = decision.explained;

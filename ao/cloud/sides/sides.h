@@ -3,6 +3,7 @@
 
 #include "ao/cloud/sides/patches.h"
 #include "ao/cloud/surface/disc_rays.h"
+#include "projection/base/finding.h"
 
 #include <optional>
 #include <string>
@@ -20,11 +21,12 @@ struct SidesEffort {
 
 /// The sides found. Signs refer to the surface's normals as they were given.
 struct Sides {
-    std::vector<std::int8_t> sign;      ///< by index in the tree: -1 = the normal has to be turned
-    std::vector<float> confidence;      ///< by index in the tree, 0 .. 1
-    std::string why;                    ///< in words; empty where the rule says it all
-    std::optional<std::string> doubt{}; ///< where both answers explain the cloud equally well
-    bool sure = false;                  ///< a room or a body, and nothing else would do
+    std::vector<std::int8_t> sign;    ///< by index in the tree: -1 = the normal has to be turned
+    std::vector<float> confidence;    ///< by index in the tree, 0 .. 1
+    std::string why;                  ///< in words; empty where the rule says it all
+    std::optional<Finding> finding{}; ///< whether one answer explains the cloud better than the other; none = by rule
+    bool sure = false;                ///< a room or a body, and nothing else would do
+    [[nodiscard]] bool doubted() const { return finding && !finding->doubt.empty(); }
     /// Shares of the cloud that stations explain with these sides, and with those given: if asked for, and where
     /// stations were looked for.
     std::optional<double> explained{}, explained_as_given{};
