@@ -110,7 +110,8 @@ Falloff falloff_named(std::string_view name) {
     return falloff;
 }
 
-CosineDirections::CosineDirections(int rays, int seed) : rays_(rays), sets_(std::clamp(65536 / rays, 1, 256)) {
+CosineDirections::CosineDirections(int rays, int seed, bool by_block)
+    : rays_(rays), sets_(std::clamp(65536 / rays, 1, 256)) {
     directions_.reserve(static_cast<std::size_t>(rays_) * static_cast<std::size_t>(sets_));
     for (int set = 0; set < sets_; ++set) {
         const std::uint32_t key = hash(static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(set));
@@ -122,9 +123,11 @@ CosineDirections::CosineDirections(int rays, int seed) : rays_(rays), sets_(std:
                                    static_cast<float>(std::sqrt(a) * std::sin(b)), static_cast<float>(std::sqrt(1 - a)),
                                    static_cast<int>(static_cast<long>(i) * blocks / rays_)});
         }
-        std::stable_sort(directions_.end() - rays_, directions_.end(), [&](const Direction& one, const Direction& two) {
-            return place_of(one, rays_) < place_of(two, rays_);
-        });
+        const auto place = [&](const Direction& one) {
+            return std::pair(by_block ? one.block : 0, place_of(one, rays_));
+        };
+        std::stable_sort(directions_.end() - rays_, directions_.end(),
+                         [&](const Direction& one, const Direction& two) { return place(one) < place(two); });
     }
 }
 
@@ -146,7 +149,9 @@ RayEstimate RayHemisphere::at(const RayStart& start) const {
     bundle.far_m = static_cast<float>(std::min(radius_m_ - lift, 1e30));
     bundle.own = {surface_.local(start.point), static_cast<float>(2 * start.disc_radius_m),
                   static_cast<float>(0.2 * start.disc_radius_m)};
-    const auto directions = directions_.set_for(hash(start.key ^ 0x68bc21ebU));
+    auto directions = directions_.set_for(hash(start.key ^ 0x68bc21ebU));
+    if (const std::size_t part = directions.size() / CosineDirections::blocks; start.block)
+        directions = directions.subspan(static_cast<std::size_t>(*start.block) * part, part);
     std::array<Tally, 3> tallies;
     for (std::size_t first = 0; first < directions.size(); first += RayBundle::size) {
         const auto eight = directions.subspan(first, std::min<std::size_t>(RayBundle::size, directions.size() - first));

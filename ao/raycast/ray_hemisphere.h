@@ -23,7 +23,8 @@ inline constexpr std::array falloff_words{Named{"hard", Falloff::hard}, Named{"q
 /// once; each point picks a set by its key and rotates it about its normal.
 class CosineDirections {
   public:
-    CosineDirections(int rays, int seed);
+    /// `by_block`: the directions of each block stand together, so that starts may cast a block alone.
+    CosineDirections(int rays, int seed, bool by_block = false);
 
     /// One direction of a set: components, and which of `blocks` equal parts of the sequence it belongs to.
     struct Direction {
@@ -37,7 +38,7 @@ class CosineDirections {
 
   private:
     int rays_, sets_;
-    std::vector<Direction> directions_; ///< sorted, so that the eight rays of a bundle point in similar directions
+    std::vector<Direction> directions_; ///< sorted by block or not, then so that the rays of a bundle are alike
 };
 
 /// Visibility under each falloff, from the same rays, with one standard error.
@@ -54,6 +55,7 @@ struct RayStart {
     double disc_radius_m = 0;      ///< of the point's own disc, where it has one
     std::span<const Eigen::Vector3d> faces = {}; ///< normals of the faces round a vertex: directions below all of them
                                                  ///< are inside and are not cast
+    std::optional<int> block = {};               ///< casts this part of the sequence alone; neighbours cast the others
 };
 
 /// Share of the cosine-weighted hemisphere about `normal` that is open within a radius, methods.md's equation 1.

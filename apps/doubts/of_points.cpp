@@ -61,7 +61,7 @@ void check_radius_of_points(const Cloud& cloud, const PointVisibility& found, Fi
     const double radius = found.radius, spacing = found.spacing;
     if (!(radius > 0))
         return;
-    if (spacing > 0)
+    if (spacing > 0 && triangles_of(cloud).empty())
         at_least(findings, Check::radius_in_spacings, radius / spacing, least_radius_spacings, [&] {
             return fmt::format("the radius of {:.3g} is only {:.2g} times the points' spacing of {:.3g}: surfaces "
                                "within it are single points. Give a larger --radius.",

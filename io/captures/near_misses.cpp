@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr const char* meshes = "meshes are read from PLY, which Blender, MeshLab and CloudCompare write";
+constexpr const char* meshes = "meshes are read from PLY, OBJ and glTF, which Blender writes, too";
 constexpr const char* splats =
     "Gaussian splats are read from PLY, .splat and .spz: `splat-transform IN OUT.ply` makes one";
 constexpr const char* videos =
@@ -31,11 +31,8 @@ struct Foreign {
     const char* instead;
 };
 constexpr std::array foreign{
-    Foreign{".obj", "", "a mesh in OBJ", meshes},
     Foreign{".stl", "solid ", "a mesh in STL", meshes},
     Foreign{".off", "OFF", "a mesh in OFF", meshes},
-    Foreign{".glb", "glTF", "a mesh in glTF", meshes},
-    Foreign{".gltf", "", "a mesh in glTF", meshes},
     Foreign{".fbx", "Kaydara FBX", "a scene in FBX", meshes},
     Foreign{".dae", "", "a scene in COLLADA", meshes},
     Foreign{".3ds", "", "a mesh in 3DS", meshes},

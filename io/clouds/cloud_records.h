@@ -54,7 +54,7 @@ struct CloudRecords {
     cv::Size grid;
     std::string before;     ///< PLY elements that come before the vertices
     std::string points;     ///< the records, without the last one's line end
-    std::string packed;     ///< PCD, LAZ: the compressed block as the file has it
+    std::string packed;     ///< PCD, LAZ: the compressed block as the file has it; OBJ, glTF: the file
     std::size_t stride = 0; ///< bytes per record; 0 where records differ in length (text, lists)
     std::vector<std::size_t>
         ends; ///< where each record ends in `points` (text: behind its last word), when stride is 0
@@ -169,6 +169,11 @@ class TextRecords {
 /// alone keeps its grid, if every cell has one point.
 [[nodiscard]] CloudRecords read_e57(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
+/// OBJ and glTF: points and triangles as the records of a PLY with faces; the file's own bytes are in `packed`.
+[[nodiscard]] CloudRecords read_obj_cloud(std::string_view bytes, const std::filesystem::path& file,
+                                          std::vector<std::string>& warnings);
+[[nodiscard]] CloudRecords read_gltf_cloud(std::string_view bytes, const std::filesystem::path& file,
+                                           std::vector<std::string>& warnings);
 /// Faces as triangles, polygons fanned from their first corner; -1 for an index that names no vertex. Tristrips are not
 /// read.
 [[nodiscard]] std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records);

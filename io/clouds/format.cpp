@@ -1,6 +1,7 @@
 // The table of cloud formats, and the questions that it answers.
 #include "io/clouds/format.h"
 
+#include "io/clouds/mesh_textures.h"
 #include "io/clouds/packed_splats.h"
 #include "io/images/format.h"
 #include "io/text.h"
@@ -56,6 +57,8 @@ constexpr CloudFormat formats[] = {
      .written = &ply_bytes,
      .shape = &ply_shape,
      .triangles = &ply_triangles,
+     .textured = &ply_texture,
+     .linked = &with_ply_links,
      .binary_encoding = "binary_little_endian",
      .new_colours = NewColours::bytes},
     {.name = "LAZ",
@@ -86,6 +89,40 @@ constexpr CloudFormat formats[] = {
      .binary_encoding = "binary_little_endian",
      .new_colours = NewColours::bytes,
      .z_up = true},
+    {.name = "OBJ",
+     .content = "meshes, with MTL; points with colours",
+     .extensions = {".obj"},
+     .written_extension = ".ply", // which has fields
+     .read = &read_obj_cloud,
+     .written = &ply_bytes,
+     .triangles = &ply_triangles,
+     .textured = &obj_texture,
+     .linked = &with_obj_links,
+     .binary_encoding = "binary_little_endian",
+     .new_colours = NewColours::bytes},
+    {.name = "GLB",
+     .content = "binary glTF 2.0: meshes and points of its scene, y up; uncompressed",
+     .signature = &is_glb,
+     .extensions = {".glb"},
+     .written_extension = ".ply",
+     .read = &read_gltf_cloud,
+     .written = &ply_bytes,
+     .triangles = &ply_triangles,
+     .textured = &gltf_texture,
+     .linked = &with_gltf_links,
+     .binary_encoding = "binary_little_endian",
+     .new_colours = NewColours::bytes},
+    {.name = "glTF",
+     .content = "the same as JSON",
+     .extensions = {".gltf"},
+     .written_extension = ".ply",
+     .read = &read_gltf_cloud,
+     .written = &ply_bytes,
+     .triangles = &ply_triangles,
+     .textured = &gltf_texture,
+     .linked = &with_gltf_links,
+     .binary_encoding = "binary_little_endian",
+     .new_colours = NewColours::bytes},
     {.name = "XYZ",
      .content = "lines of numbers",
      .extensions = {".xyz"},

@@ -13,6 +13,10 @@
 
 namespace scanshade {
 
+struct LinkedFiles;
+struct LinkRequest;
+struct TexturedMesh;
+
 /// How a format takes colours that the file did not have: as bytes red, green and blue, or packed in one float, rgb.
 enum class NewColours { none, bytes, packed };
 
@@ -33,10 +37,12 @@ struct CloudFormat {
     std::string (*shaded)(const CloudRecords& records, std::span<const float> visibility, double strength) = nullptr;
     CloudShape (*shape)(const FileBytes& file, std::vector<std::string>& warnings) = nullptr; ///< none: read as a whole
     std::vector<std::array<int, 3>> (*triangles)(const CloudRecords& records) = nullptr;      ///< none: no meshes
-    std::string_view binary_encoding = "binary"; ///< what the format calls little-endian numbers
-    bool wide_colours = false;                   ///< red, green and blue may have 16 bits
-    NewColours new_colours = NewColours::none;   ///< of a file that has none
-    bool z_up = false;                           ///< z points up, by definition or custom
+    TexturedMesh (*textured)(const CloudRecords& records, const std::filesystem::path& file) = nullptr;
+    LinkedFiles (*linked)(const LinkRequest& asked) = nullptr; ///< there where `textured` is
+    std::string_view binary_encoding = "binary";               ///< what the format calls little-endian numbers
+    bool wide_colours = false;                                 ///< red, green and blue may have 16 bits
+    NewColours new_colours = NewColours::none;                 ///< of a file that has none
+    bool z_up = false;                                         ///< z points up, by definition or custom
 };
 
 /// The format, by how the file begins, or by its name where only that tells; none where it is unknown.

@@ -1,6 +1,8 @@
 // PLY 1.0 (Turk 1994): header checked line by line, the vertices walked, everything else kept as the file's own bytes.
 #include "io/clouds/cloud_records.h"
 
+#include "io/clouds/cloud_edit.h"
+#include "io/clouds/mesh_textures.h"
 #include "io/clouds/packed_splats.h"
 #include "io/clouds/splats.h"
 #include "io/file_bytes.h"
@@ -10,6 +12,8 @@
 #include <algorithm>
 #include <array>
 #include <fmt/format.h>
+#include <limits>
+#include <map>
 
 namespace scanshade {
 
@@ -263,10 +267,11 @@ std::optional<std::size_t> index_list(const Element& element) {
     return std::nullopt;
 }
 
-/// Reads the vertex indices of face records.
+/// Reads the vertex indices of face records, or another list of theirs.
 class FaceIndices {
   public:
-    FaceIndices(const Element& faces, const PlyHeader& header) : list_(*index_list(faces)) {
+    FaceIndices(const Element& faces, const PlyHeader& header) : FaceIndices(faces, header, *index_list(faces)) {}
+    FaceIndices(const Element& faces, const PlyHeader& header, std::size_t list) : list_(list) {
         view_.encoding = header.encoding;
         view_.fields = faces.properties;
     }
@@ -506,12 +511,14 @@ CloudShape ply_shape(const FileBytes& file, std::vector<std::string>& warnings) 
     return shape;
 }
 
-std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records) {
+namespace {
+
+/// Calls visit(element, corners, record) for each face that lists vertices; -1 for an index that names none.
+template <class Visit>
+void for_each_face(const CloudRecords& records, const PlyHeader& header, Visit&& visit) {
     const fs::path name = "mesh";
-    const PlyHeader header = parse_header(records.header, name);
     BodyWalk before(records.before, header, name), after(records.after, header, name);
     BodyWalk* walk = &before;
-    std::vector<std::array<int, 3>> triangles;
     for (const Element& element : header.elements) {
         if (element.name == "vertex") {
             walk = &after;
@@ -520,18 +527,160 @@ std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records) {
             std::vector<int> corners;
             walk->walk(element, [&](std::uint64_t, std::size_t start, std::size_t end) {
                 corners.clear();
-                indices.for_each(walk->body().substr(start, end - start), [&](double vertex) {
+                const std::string_view record = walk->body().substr(start, end - start);
+                indices.for_each(record, [&](double vertex) {
                     const bool named = vertex >= 0 && vertex < static_cast<double>(records.point_count);
                     corners.push_back(named ? static_cast<int>(vertex) : -1);
                 });
-                for (std::size_t i = 2; i < corners.size(); ++i)
-                    triangles.push_back({corners[0], corners[i - 1], corners[i]});
+                visit(element, corners, record);
             });
         } else {
             skip(*walk, element, header);
         }
     }
+}
+
+/// Two fields of the vertices that hold texture coordinates, by the names that programs give them.
+std::optional<std::array<std::size_t, 2>> coordinate_fields(const CloudRecords& records) {
+    for (const auto& names :
+         {std::array{"s", "t"}, {"u", "v"}, {"texture_u", "texture_v"}, {"texture_s", "texture_t"}}) {
+        const auto u = records.field_named(names[0]), v = records.field_named(names[1]);
+        if (u && v)
+            return std::array{*u, *v};
+    }
+    return std::nullopt;
+}
+
+/// A number of a face: which texture it uses.
+int texture_number(const Element& faces, const PlyHeader& header, std::string_view record) {
+    const auto field = std::ranges::find(faces.properties, std::string("texnumber"), &CloudField::name);
+    if (field == faces.properties.end() || field->list_length)
+        return 0;
+    CloudRecords view;
+    view.encoding = header.encoding;
+    view.fields = faces.properties;
+    const double number = value_at(view, record, static_cast<std::size_t>(field - faces.properties.begin()));
+    constexpr double most = 1e6;
+    return number >= 0 && number < most ? static_cast<int>(number) : 0;
+}
+
+/// The mesh of a PLY, face by face.
+class PlyTexture {
+  public:
+    explicit PlyTexture(const CloudRecords& records)
+        : records_(records), header_(parse_header(records.header, "mesh")), fields_(coordinate_fields(records)) {
+        if (const auto normals = normal_fields(records))
+            normals_ = normals_of(records, *normals);
+        if (!normals_.empty()) {
+            PointOddities unheard;
+            points_ = points_of(records, unheard);
+        }
+    }
+
+    TexturedMesh mesh() {
+        mesh_.tiles = true;
+        for_each_face(records_, header_, [&](const Element& faces, const std::vector<int>& corners, auto record) {
+            places_.clear();
+            const auto list = std::ranges::find(faces.properties, std::string("texcoord"), &CloudField::name);
+            if (list != faces.properties.end() && list->list_length)
+                FaceIndices(faces, header_, static_cast<std::size_t>(list - faces.properties.begin()))
+                    .for_each(record, [&](double number) { places_.push_back(static_cast<float>(number)); });
+            take(corners, material(texture_number(faces, header_, record)));
+        });
+        if (!any_)
+            mesh_.sets.clear();
+        return std::move(mesh_);
+    }
+
+  private:
+    int material(int number) {
+        const auto [row, is_new] = materials_.try_emplace(number, static_cast<int>(materials_.size()));
+        if (is_new)
+            mesh_.materials.push_back({std::to_string(number)});
+        return row->second;
+    }
+
+    [[nodiscard]] Eigen::Vector2f place(std::size_t corner, int vertex, std::size_t corners) const {
+        constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+        if (places_.size() == 2 * corners)
+            return {places_[2 * corner], 1 - places_[2 * corner + 1]};
+        if (!fields_ || vertex < 0)
+            return {nan, nan};
+        const std::string_view record = records_.record(static_cast<std::size_t>(vertex));
+        return {static_cast<float>(value_at(records_, record, (*fields_)[0])),
+                static_cast<float>(1 - value_at(records_, record, (*fields_)[1]))};
+    }
+
+    void take(const std::vector<int>& corners, int material) {
+        if (mesh_.sets.empty())
+            mesh_.sets.emplace_back();
+        any_ = any_ || fields_ || !places_.empty();
+        for (std::size_t i = 2; i < corners.size(); ++i) {
+            const std::array<std::size_t, 3> of{0, i - 1, i};
+            std::array<int, 3> triangle{};
+            TextureCorners places;
+            for (std::size_t k = 0; k < 3; ++k) {
+                triangle[k] = corners[of[k]];
+                places[k] = place(of[k], corners[of[k]], corners.size());
+            }
+            mesh_.triangles.push_back(triangle);
+            mesh_.sets[0].push_back(places);
+            mesh_.material.push_back(material);
+            if (!normals_.empty())
+                mesh_.reversed.push_back(reversed(triangle));
+        }
+    }
+
+    [[nodiscard]] bool reversed(const std::array<int, 3>& triangle) const {
+        std::array<Eigen::Vector3d, 3> at;
+        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+        for (std::size_t k = 0; k < 3; ++k) {
+            if (triangle[k] < 0)
+                return false;
+            at[k] = points_[static_cast<std::size_t>(triangle[k])];
+            sum += normals_[static_cast<std::size_t>(triangle[k])];
+        }
+        return is_reversed(at, sum);
+    }
+
+    const CloudRecords& records_;
+    PlyHeader header_;
+    std::optional<std::array<std::size_t, 2>> fields_;
+    std::vector<Eigen::Vector3d> normals_, points_;
+    std::vector<float> places_; ///< of the face at hand
+    std::map<int, int> materials_;
+    bool any_ = false;
+    TexturedMesh mesh_;
+};
+
+} // namespace
+
+std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records) {
+    std::vector<std::array<int, 3>> triangles;
+    for_each_face(records, parse_header(records.header, "mesh"),
+                  [&](const Element&, const std::vector<int>& corners, std::string_view) {
+                      for (std::size_t i = 2; i < corners.size(); ++i)
+                          triangles.push_back({corners[0], corners[i - 1], corners[i]});
+                  });
     return triangles;
+}
+
+TexturedMesh ply_texture(const CloudRecords& records, const fs::path&) { return PlyTexture(records).mesh(); }
+
+LinkedFiles with_ply_links(const LinkRequest& asked) {
+    LinkedFiles made;
+    const CloudRecords& records = asked.records;
+    made.files.push_back(
+        {asked.name + ".ply", between(records.header, records.before + records.points, records.after)});
+    constexpr std::string_view comment = "comment TextureFile ";
+    for (const TextLine& line : text_lines(records.header))
+        if (line.text.starts_with(comment))
+            if (const auto path = path_within(trimmed(line.text.substr(comment.size()))))
+                made.copies.push_back(*path);
+    for (const OcclusionLink& link : asked.links)
+        made.notes.push_back(
+            fmt::format("{} is not linked: one more TextureFile in a PLY would renumber the others.", link.image));
+    return made;
 }
 
 std::string ply_bytes(const CloudRecords& records, std::string points, const std::vector<FieldAddition>& additions) {

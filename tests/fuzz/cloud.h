@@ -3,6 +3,7 @@
 
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
+#include "io/clouds/mesh_textures.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace scanshade::fuzz {
@@ -18,6 +19,14 @@ inline void ask_for_all(const Cloud& cloud, const std::filesystem::path& file) {
     (void)accepted([&] { (void)recorded_field(cloud, "ambient_occlusion", file); });
     (void)accepted([&] { (void)recorded_field(cloud, "intensity", file); });
     (void)describe(*cloud.records);
+    (void)accepted([&] {
+        const TexturedMesh mesh = textured_mesh(cloud, file);
+        must_hold(mesh.triangles == triangles_of(cloud) && mesh.material.size() == mesh.triangles.size());
+        for (const auto& set : mesh.sets)
+            must_hold(set.size() == mesh.triangles.size());
+        const std::vector<OcclusionLink> links{{mesh.materials.size() - 1, 0, "a.png", "image"}};
+        must_hold(!linked_mesh(cloud, file, "linked", mesh, links, true).files.empty());
+    });
 }
 
 /// Whether the file begins as one of another format does.

@@ -76,6 +76,21 @@ void clouds() {
         "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\n"
         "property float ny\nproperty float nz\nproperty list uchar int more\nproperty uchar red\n"
         "property uchar green\nproperty uchar blue\n";
+    seed("mesh", "a.obj",
+         "mtllib a.mtl\nv 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\nusemtl m\n"
+         "f 1/1/1 2/2/1 -1/-1/-1\n");
+    const std::string gltf =
+        R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0,"scale":[-1,1,1]}],"materials":[{"name":"m"}],"meshes":[{"primitives":[)"
+        R"({"material":0,"attributes":{"POSITION":0,"TEXCOORD_0":1}}]}],"accessors":[{"bufferView":0,"componentType":5126,)"
+        R"("type":"VEC3","count":3},{"bufferView":0,"byteOffset":4,"componentType":5126,"type":"VEC2","count":3}],)"
+        R"("bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36)";
+    const std::string bin(36, '\x3f');
+    std::string json = gltf + "}]}";
+    json.resize((json.size() + 3) / 4 * 4, ' ');
+    seed("mesh", "a.gltf", gltf + R"(,"uri":"data:;base64,Pz8/Pz8/Pz8/Pz8/Pz8/Pz8/Pz8/Pz8/Pz8/Pz8/Pz8/Pz8/"}]})");
+    seed("mesh", "a.glb",
+         "glTF" + raw(2U) + raw(static_cast<std::uint32_t>(28 + json.size() + bin.size())) +
+             raw(static_cast<std::uint32_t>(json.size())) + "JSON" + json + raw(36U) + std::string("BIN\0", 4) + bin);
     seed("ply", "ascii.ply",
          "ply\nformat ascii 1.0\ncomment c\nobj_info num_cols 3\nobj_info num_rows 1\n" + vertex +
              "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 1 0 0 1 2 5 6 1 2 3\n"

@@ -31,14 +31,11 @@ TEST_P(ForeignFiles, are_refused_by_name_alone_and_in_a_folder) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, ForeignFiles,
-                         testing::Values(ForeignFile{"m.obj", "# a mesh\nv 0 0 0\n",
-                                                     "a mesh in OBJ, which is not read: meshes are read from PLY"},
-                                         ForeignFile{"m.OBJ", "v 0 0 0\n", "a mesh in OBJ"},
-                                         ForeignFile{"m.stl", "solid box\nfacet normal 0 0 1\n", "a mesh in STL"},
+                         testing::Values(ForeignFile{"m.stl", "solid box\nfacet normal 0 0 1\n",
+                                                     "a mesh in STL, which is not read: meshes are read from PLY"},
+                                         ForeignFile{"m.STL", "solid box\n", "a mesh in STL"},
                                          ForeignFile{"b.stl", "binary\1\2\3", "a mesh in STL"},
                                          ForeignFile{"m.off", "OFF\n8 6 12\n", "a mesh in OFF"},
-                                         ForeignFile{"m.glb", "glTF\2", "a mesh in glTF"},
-                                         ForeignFile{"m.gltf", "{\"asset\": {}}", "a mesh in glTF"},
                                          ForeignFile{"m.fbx", "Kaydara FBX Binary", "a scene in FBX"},
                                          ForeignFile{"s.sog", "\1\2\3", "Gaussian splats in SOG"},
                                          ForeignFile{"s.ksplat", "\1\2\3", "Gaussian splats in .ksplat"},
@@ -86,12 +83,12 @@ TEST_F(Made, folders_without_frames_say_what_they_hold_and_why_that_is_none) {
     EXPECT_TRUE(says(complaint(), "\n  depth/: it is empty"));
     colour("depth/0.jpg", {16, 12});
     EXPECT_TRUE(says(complaint(), "\n  depth/0.jpg (JPEG of 8 bits, 3 channels): a picture, also of depth in colours"));
-    for (const char* name : {"a.obj", "b.obj", "c.stl", "d.mp4", "e.pcap"})
+    for (const char* name : {"a.off", "b.off", "c.stl", "d.mp4", "e.pcap"})
         text(name, "some");
     const std::string full = complaint();
-    EXPECT_TRUE(says(full, "it holds 7 files (2 .jpg, 2 .obj, 1 .mp4, 1 .pcap, 1 .stl)"));
+    EXPECT_TRUE(says(full, "it holds 7 files (2 .jpg, 2 .off, 1 .mp4, 1 .pcap, 1 .stl)"));
     EXPECT_EQ(std::ranges::count(full, '\n'), 4) << "three reasons, and where to look: " << full;
-    EXPECT_EQ(full.find("b.obj"), std::string::npos) << "one of a kind is enough";
+    EXPECT_EQ(full.find("b.off"), std::string::npos) << "one of a kind is enough";
 }
 
 TEST_F(Made, grey_pictures_are_too_coarse_for_depth) {

@@ -1,0 +1,74 @@
+// A glTF file taken apart: its JSON, buffers, and the numbers of accessors, all checked.
+#pragma once
+
+#include "io/shallow_json.h"
+#include "projection/base/error.h"
+
+#include <cstddef>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace scanshade {
+
+using OrderedJson = nlohmann::ordered_json; ///< keeps the order of names, so that a file is written as it was
+
+struct GltfFile {
+    OrderedJson json;
+    std::vector<std::string> buffers;
+    std::string_view chunks; ///< of a binary file, behind its BIN chunk, as they are
+    bool binary = false;
+    bool has_bin = false; ///< buffer 0 is the BIN chunk
+};
+
+/// Throws Error naming what is damaged. `with_buffers` = false: the BIN chunk alone is taken.
+[[nodiscard]] GltfFile gltf_file(std::string_view bytes, const std::filesystem::path& file, bool with_buffers = true);
+/// The file that a URI names in the folder of the glTF; none for others.
+[[nodiscard]] std::optional<std::filesystem::path> path_of_uri(const std::string& uri);
+/// A GLB of these parts.
+[[nodiscard]] std::string glb_bytes(const OrderedJson& json, std::string bin, std::string_view chunks);
+
+/// Runs `action`; what the JSON library throws becomes an Error.
+template <class Action>
+decltype(auto) with_json(Action&& action) {
+    try {
+        return std::forward<Action>(action)();
+    } catch (const OrderedJson::exception& wrong) {
+        throw Error(json_problem(wrong.id, wrong.what()));
+    }
+}
+
+/// object[key] as a whole number; `usual` where it is missing. Throws Error for anything else.
+[[nodiscard]] std::size_t whole_in(const OrderedJson& object, const char* key, std::optional<std::size_t> usual = {});
+/// file.json[table][index]; Error where there is no such element.
+[[nodiscard]] const OrderedJson& element_of(const OrderedJson& json, const char* table, std::size_t index);
+/// The size of a table; 0 where it is missing.
+[[nodiscard]] std::size_t size_of_table(const OrderedJson& json, const char* table);
+
+/// Elements of numbers, somewhere in a buffer.
+class Accessor {
+  public:
+    Accessor(const GltfFile& file, std::size_t index);
+    [[nodiscard]] std::size_t count() const { return count_; }
+    [[nodiscard]] std::size_t width() const { return width_; } ///< numbers in an element
+    [[nodiscard]] bool is_float() const { return type_ == 5126; }
+    /// A number, 0 .. 1 or -1 .. 1 where integers stand for fractions.
+    [[nodiscard]] double operator()(std::size_t element, std::size_t number) const;
+    /// An index of a vertex.
+    [[nodiscard]] std::size_t whole(std::size_t element) const {
+        return static_cast<std::size_t>(stored(data_ + element * stride_));
+    }
+
+  private:
+    [[nodiscard]] double stored(const char* at) const;
+
+    const char* data_ = nullptr;
+    std::size_t count_ = 0, width_ = 0, stride_ = 0, size_ = 0;
+    std::size_t type_ = 0; ///< glTF's componentType
+    bool fractions_ = false;
+};
+
+} // namespace scanshade
