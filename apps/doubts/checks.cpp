@@ -87,13 +87,15 @@ constexpr std::array rows{
     CheckRow{Check::all_open, "all_open", "result", "share of values that are 1 though there are hollows",
              "above 0.999"},
     CheckRow{Check::all_closed, "all_closed", "result", "share of values that are 0", "above 0.999"},
+    CheckRow{Check::texture_overlap, "texture_overlap", "result",
+             "share of the texels that several parts of a mesh use", "above 0.01"},
 };
 
 constexpr bool in_order() {
     for (std::size_t i = 0; i < rows.size(); ++i)
         if (rows[i].check != static_cast<Check>(i))
             return false;
-    return rows.size() == static_cast<std::size_t>(Check::all_closed) + 1;
+    return rows.size() == static_cast<std::size_t>(Check::texture_overlap) + 1;
 }
 static_assert(in_order(), "each check has its row, in the order of Check");
 

@@ -63,6 +63,10 @@ std::vector<fs::path> files_of(const CaptureEntry& entry, const Outputs& outputs
         add(points_file(entry.name, 0));
     if (entry.cloud.empty() && outputs.depth_cloud)
         add(cloud_file(entry.name, ".ply"));
+    if (outputs.texture.wanted) // images of several materials are named after these
+        for (const std::string& end : {std::string(".obj"), std::string(".mtl"), std::string(".glb"),
+                                       std::string(".gltf"), std::string(".ply"), ".ao" + extension(outputs.format)})
+            add(fs::path(texture_folder) / (entry.name + end));
     if (outputs.glb)
         add(cloud_file(entry.name, ".glb"));
     if (!entry.cloud.empty() && of_points(outputs).cloud)

@@ -19,10 +19,22 @@ namespace scanshade {
 enum class CloudColours { kept, shaded, grey };
 
 /// The folders that Outputs fill.
-inline constexpr std::array result_folders = {"ao",     "confidence", "error", "shaded", "unshaded", "ambient",
-                                              "direct", "indirect",   "panel", "clouds", "previews", "points"};
+inline constexpr std::array result_folders = {"ao",       "confidence", "error",    "shaded", "unshaded",
+                                              "ambient",  "direct",     "indirect", "panel",  "clouds",
+                                              "previews", "points",     "meshes"};
+inline constexpr const char* texture_folder = "meshes";
 /// That of tars of results (result_tars.h).
 inline constexpr const char* tar_folder = "tars";
+
+/// Textures of a mesh's occlusion, in meshes/.
+struct TextureOutput {
+    bool wanted = false;
+    int size = 1024;      ///< texels, of each side
+    int margin = -1;      ///< texels; negative = size / 128
+    int rays = 0;         ///< of each texel; 0 = as TextureAoOptions
+    int seed = 0;         ///< of these
+    bool replace = false; ///< an occlusionTexture of a glTF
+};
 
 /// The files written for each frame, under `folder`: ao/NAME.png, confidence/NAME.png, error/NAME.png, shaded/NAME.png,
 /// panel/NAME.png, clouds/NAME.pcd or .ply; for the page previews/NAME.js, or points/NAME.000.js and on of a cloud
@@ -41,7 +53,8 @@ struct Outputs {
     bool cloud = true; ///< a cloud input with the fields ambient_occlusion and ao_confidence, everything else as it was
     bool depth_cloud = false; ///< a new PLY of a depth frame's points, in camera space
     bool glb = false;         ///< the points of either as binary glTF
-    bool mcap = false;        ///< all frames as one recording, run.mcap; not a file of a frame
+    TextureOutput texture = {};
+    bool mcap = false; ///< all frames as one recording, run.mcap; not a file of a frame
     AoFormat format = AoFormat::png16;
     /// Of unshaded, ambient, direct and indirect; none: PNG with as many bits as the colour image has.
     std::optional<AoFormat> colour_format = {};

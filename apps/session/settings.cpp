@@ -62,7 +62,7 @@ constexpr auto maybe_quality_words = [] {
 
 std::set<std::string> words_of(const std::string& list) {
     const std::vector<std::string> known{"ao",       "confidence", "error", "shaded", "unshaded", "light",
-                                         "indirect", "cloud",      "panel", "glb",    "mcap"};
+                                         "indirect", "cloud",      "panel", "glb",    "mcap",     "texture"};
     std::set<std::string> words;
     std::istringstream stream(list);
     for (std::string word; std::getline(stream, word, ',');) {
@@ -93,6 +93,7 @@ Outputs outputs_from(const RunSettings& asked) {
     wanted.shade_strength = asked.shade_strength;
     wanted.colour_cloud = asked.colour_cloud;
     wanted.colour_view = asked.colour_view;
+    wanted.texture = asked.texture;
     wanted.frames_in_tar = static_cast<std::size_t>(asked.frames_in_tar);
     wanted.preview = asked.page && asked.frames_in_tar == 0;
     wanted.page_points = page_points_from(asked.page_points);
@@ -108,6 +109,7 @@ Outputs outputs_from(const RunSettings& asked) {
         wanted.panel = words.contains("panel");
         wanted.glb = words.contains("glb");
         wanted.mcap = words.contains("mcap");
+        wanted.texture.wanted = words.contains("texture");
         wanted.cloud = wanted.depth_cloud = words.contains("cloud");
     }
     if (wanted.mcap && wanted.frames_in_tar > 0)
@@ -341,16 +343,33 @@ std::vector<Stage> RunSettings::common_stages() { // NOLINT(readability-function
            .affects = Affects::nothing},
           {.name = "write",
            .help =
-               "any of ao,confidence,error,shaded,unshaded,light,indirect,cloud,panel,glb,mcap; auto = "
+               "any of ao,confidence,error,shaded,unshaded,light,indirect,cloud,panel,glb,mcap,texture; auto = "
                "ao,confidence,shaded, and cloud for clouds. error: the expected error of each value; confidence is "
                "1 - error / 0.3. unshaded: colour divided by visibility, where confidence allows it; light: ambient "
                "and direct, the parts of colour; indirect: colour that neighbours send; glb: each frame's points or "
-               "mesh as binary glTF; mcap: run.mcap, one recording of all frames for Foxglove, Rerun and ROS",
+               "mesh as binary glTF; mcap: run.mcap, all frames for Foxglove, Rerun and ROS; texture: images for the "
+               "coordinates of meshes",
            .value = &s.write,
            .common = true,
            .affects = Affects::outputs},
+          {.name = "texture-size",
+           .help = "texels of a mesh's texture, across and down",
+           .value = &s.texture.size,
+           .low = 16,
+           .high = 16384,
+           .affects = Affects::outputs},
+          {.name = "texture-margin",
+           .help = "texels round the charts of a texture that continue their values; -1 = a 128th of the size",
+           .value = &s.texture.margin,
+           .low = -1,
+           .high = 4096,
+           .affects = Affects::outputs},
+          {.name = "overwrite-occlusion",
+           .help = "replaces occlusion textures that a glTF has",
+           .value = &s.texture.replace,
+           .affects = Affects::outputs},
           {.name = "format",
-           .help = "file format of the ao maps",
+           .help = "file format of the ao maps and textures",
            .value = OneOf(&s.format, format_words),
            .common = true,
            .affects = Affects::outputs},
@@ -511,13 +530,15 @@ void RunSettings::resolve() {
         (void)depth_encoding(depth_scale, "--depth-scale");
     const CloudAoOptions usual; // what only rays can do is asked of rays
     if (clouds == CloudWalk::automatic &&
-        (clouds_by_points.radius > 0 || clouds_by_points.sky || clouds_by_points.outside != usual.outside ||
-         clouds_by_points.normals != usual.normals))
+        (outputs_.texture.wanted || clouds_by_points.radius > 0 || clouds_by_points.sky ||
+         clouds_by_points.outside != usual.outside || clouds_by_points.normals != usual.normals))
         clouds = CloudWalk::points;
     refuse_settings_of_others();
     cloud_options_ = clouds_by_points;
     if (cloud_options_.radius == 0 && radius)
         cloud_options_.radius = *radius;
+    outputs_.texture.rays = cloud_options_.rays;
+    outputs_.texture.seed = cloud_options_.seed;
     (void)CloudAo(cloud_options_);
     put_common_settings();
 }

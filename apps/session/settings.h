@@ -52,6 +52,7 @@ class RunSettings {
     AoFormat format = AoFormat::png16;
     std::optional<AoFormat> colour_format = {};
     bool colour_view = false;
+    TextureOutput texture = {};
     Shade shade = Shade::multiply;
     std::string light = "auto";
     double shade_strength = 1;

@@ -7,6 +7,7 @@
 #include "apps/page/preview.h"
 #include "apps/picture.h"
 #include "apps/results/cloud_picture.h"
+#include "apps/walk/mesh_textures.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/glb.h"
 #include "io/clouds/number_fields.h"
@@ -205,6 +206,8 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
             write_points_glb(file, work,
                              work.frame.cloud ? points_of_cloud(work, outputs) : points_of_depth(work, scene, outputs));
         });
+    if (outputs.texture.wanted)
+        write_mesh_textures(work, outputs);
 }
 
 std::filesystem::path write_cloud_picture(const Work& work, const Outputs& outputs) {

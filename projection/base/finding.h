@@ -63,6 +63,7 @@ enum class Check : std::uint8_t {
     coverage,
     all_open,
     all_closed,
+    texture_overlap,
 };
 
 struct Finding {
