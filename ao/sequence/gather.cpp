@@ -24,8 +24,10 @@ std::unique_ptr<gpu::Program> gathering(gpu::Device& device, cv::Size size, std:
                    {"surfaces", most * pixels * 8, Host::taken, Texels::rg32ui},
                    {"visibilities", most * pixels * 4, Host::taken, Texels::r32f},
                    {"mean", pixels * 4, Host::download, Texels::r32f},
-                   {"spread", pixels * 8, Host::download, Texels::rg32f}};
-    all.add_pass("gather", "sequence/gather", {own_surfaces, own_visibility, surfaces, visibilities}, {mean, spread});
+                   {"spread", pixels * 8, Host::none, Texels::rg32f}};
+    const int rows = (size.height + shared::gathered_rows - 1) / shared::gathered_rows;
+    all.add_pass_over({size.width, rows}, "gather", "sequence/gather",
+                      {own_surfaces, own_visibility, surfaces, visibilities}, {mean, spread});
     return all.program(device, sizeof(shared::GatherConstants));
 }
 
@@ -66,7 +68,8 @@ AoMap Gather::compute(const Seen& own, std::span<const Seen> others, const Gathe
 }
 
 std::vector<Intermediate> Gather::intermediates() {
-    const auto each = program_->host_as<cv::Vec2f>(spread);
+    const std::vector<std::byte> read = program_->read_back(spread);
+    const std::span each(reinterpret_cast<const cv::Vec2f*>(read.data()), read.size() / sizeof(cv::Vec2f));
     const auto map = [&](int channel, const char* name, const char* meaning) {
         std::vector<float> values;
         std::ranges::transform(each, std::back_inserter(values), [&](const cv::Vec2f& both) { return both[channel]; });

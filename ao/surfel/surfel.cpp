@@ -50,8 +50,10 @@ int add_layers(ScreenTables& tables) {
     const auto bytes = static_cast<std::size_t>(halved(tables.size).area()) * 4;
     const int behind = tables.add_buffer({"behind", 2 * bytes, gpu::BufferRow::Host::none, Texels::r32ui});
     tables.passes.push_back({"clear layers", "", {}, {behind}, {1, 1, 1}, {}});
+    cv::Size threads = halved(tables.window.size());
+    threads.height = divided_up(threads.height, shared::reprojected_rows);
     for (int round = 0; round < 2; ++round) {
-        tables.add_pass_over(halved(tables.window.size()), fmt::format("reproject {}", round + 1), "surfel/reproject",
+        tables.add_pass_over(threads, fmt::format("reproject {}", round + 1), "surfel/reproject",
                              {screen_neighbours, screen_depth}, {behind}, {{shared::spec_round, round}});
         tables.passes.back().groups[2] = static_cast<std::uint32_t>(tables.neighbours);
     }

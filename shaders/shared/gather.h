@@ -5,6 +5,7 @@
 SHARED_BEGIN
 
 const int most_gathered = 64;
+const int gathered_rows = 4; // pixels of a column that one thread gathers for: they share what a place costs to load
 
 struct GatherConstants {
     ScreenConstants screen;

@@ -5,6 +5,7 @@
 SHARED_BEGIN
 
 const int surfel_group = 64;             // threads of the passes along lines
+const int reprojected_rows = 4;          // 2x2 pixels of a column that one thread reprojects
 const int surfel_run = 32;               // pixels whose edges share a word
 const uint surfel_nowhere = 0xfffffffeu; // no edge before the border of the image
 

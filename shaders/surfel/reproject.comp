@@ -2,7 +2,8 @@
 // clearly behind the one before it, the first behind the nearest pixel of the block. Outside the image and in holes the first
 // layer is the nearest surface there.
 //
-// One thread for one pixel of 2x2 of each neighbour, a round for each layer. The order of threads changes nothing.
+// One thread for one pixel each of four 2x2 of a neighbour, which share what its place costs to load; a round for each layer. The
+// order of threads changes nothing.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -31,15 +32,9 @@ float nearest_of(ivec2 block) {
     return least.x < least.y ? least.x : least.y;
 }
 
-void main() {
-    SurfelConstants s = constants;
-    k = s.screen;
-    ivec3 id = ivec3(gl_GlobalInvocationID);
-    NeighbourPlace place = constants.screen.places[id.z];
-    // Each neighbour shows other pixels of its blocks.
-    ivec2 q = 2 * id.xy + ivec2(id.z & 1, (id.z >> 1) & 1);
-    if (id.z >= k.neighbours || any(greaterThanEqual(q, k.window))) return;
-    uvec2 word = imageLoad(neighbours, (id.z * k.window.y + q.y) * k.window.x + q.x).xy;
+void reproject(ivec2 q, int neighbour, NeighbourPlace place, SurfelConstants s) {
+    if (any(greaterThanEqual(q, k.window))) return;
+    uvec2 word = imageLoad(neighbours, (neighbour * k.window.y + q.y) * k.window.x + q.x).xy;
     vec3 there = ray_there(vec2(q), place) * uintBitsToFloat(word.x), point = point_here(there, place);
     vec3 n = turned_here(vec3(bytes_of_normal(word.y)), place);
     vec2 at = (point.xy * (1.0 / point.z) - k.ray_base) * vec2(k.camera.fx, k.camera.fy);
@@ -50,4 +45,18 @@ void main() {
     float before = round == 0 ? nearest_of(block) : layer_depth(behind[layer_index(block)], k.radius);
     if (z > before + (before > 0.0 ? layer_gap(z, s) : 0.0))
         atomicMax(behind[round * layers_size() + layer_index(block)], layer_word(z, n, k.radius));
+}
+
+void main() {
+    SurfelConstants s = constants;
+    k = s.screen;
+    ivec3 id = ivec3(gl_GlobalInvocationID);
+    NeighbourPlace place = constants.screen.places[id.z];
+    if (id.z >= k.neighbours) return;
+    // Each neighbour shows other pixels of its blocks.
+    ivec2 q = 2 * id.xy * ivec2(1, reprojected_rows) + ivec2(id.z & 1, (id.z >> 1) & 1);
+    reproject(q, id.z, place, s);
+    reproject(q + ivec2(0, 2), id.z, place, s);
+    reproject(q + ivec2(0, 4), id.z, place, s);
+    reproject(q + ivec2(0, 6), id.z, place, s);
 }
