@@ -46,8 +46,8 @@ int rays_for(float steps) {
 /// Casts the rays of texels. Those of four by four neighbours are parts of one low-discrepancy sequence.
 class TexelRays {
   public:
-    TexelRays(const RaySurface& mesh, const TexelSurface& surface, const TextureAoOptions& options, int rays)
-        : surface_(surface), directions_(rays * CosineDirections::blocks, options.seed, true),
+    TexelRays(const RaySurface& mesh, const TexelSurface& surface, const TextureAoOptions& options, int rays, bool half)
+        : surface_(surface), half_(half), directions_(rays * CosineDirections::blocks, options.seed, true),
           hemisphere_(mesh, directions_, options.radius, false) {}
 
     [[nodiscard]] float at(int face, int x, int y) const {
@@ -59,31 +59,76 @@ class TexelRays {
             .at({.point = surface_.point(face, x, y),
                  .normal = surface_.normal(face).cast<double>(),
                  .key = key,
-                 .block = x % 4 + y % 4 * 4})
+                 .block = half_ ? x % 4 / 2 + y % 4 * 2 : x % 4 + y % 4 * 4})
             .visibility[0];
     }
 
   private:
     const TexelSurface& surface_;
+    bool half_; ///< every second texel casts: they share the first half of the sequence, which is even by itself
     CosineDirections directions_;
     RayHemisphere hemisphere_;
 };
 
-/// Values of all texels that one triangle has for itself; neighbours in a block follow each other, since their rays go
-/// through the same parts of the tree.
-cv::Mat1f alone(const Texels& texels, const TexelRays& rays) {
-    cv::Mat1f values(texels.size, texels.size, nothing);
-    constexpr int block = 8;
-    const int across = (texels.size + block - 1) / block;
-    tbb::parallel_for(0, across * across, [&](int i) {
-        const int left = i % across * block, top = i / across * block;
-        for (int y = top; y < std::min(top + block, texels.size); ++y)
-            for (int x = left; x < std::min(left + block, texels.size); ++x)
-                if (const std::int32_t face = texels.face[texels.index(x, y)]; face >= 0)
-                    values(y, x) = rays.at(face, x, y);
-    });
-    return values;
-}
+/// Values of all texels that one triangle has for itself.
+class Alone {
+  public:
+    /// `half`: every second texel, as on a chess board, takes the mean of its neighbours, unless it has none.
+    Alone(const Texels& texels, const TexelSurface& surface, const TexelRays& rays, bool half)
+        : texels_(texels), surface_(surface), rays_(rays), half_(half), values_(texels.size, texels.size, nothing) {}
+
+    cv::Mat1f values() {
+        for_each_texel([&](int face, int x, int y) {
+            if (!half_ || (x + y) % 2 == 0)
+                values_(y, x) = rays_.at(face, x, y);
+        });
+        if (half_)
+            for_each_texel([&](int face, int x, int y) {
+                if ((x + y) % 2 != 0)
+                    values_(y, x) = between(face, x, y);
+            });
+        return values_;
+    }
+
+  private:
+    /// Neighbours in a block follow each other, since their rays go through the same parts of the tree.
+    template <class Visit>
+    void for_each_texel(const Visit& visit) const {
+        constexpr int block = 8;
+        const int across = (texels_.size + block - 1) / block;
+        tbb::parallel_for(0, across * across, [&](int i) {
+            const int left = i % across * block, top = i / across * block;
+            for (int y = top; y < std::min(top + block, texels_.size); ++y)
+                for (int x = left; x < std::min(left + block, texels_.size); ++x)
+                    if (const std::int32_t face = texels_.face[texels_.index(x, y)]; face >= 0)
+                        visit(face, x, y);
+        });
+    }
+
+    [[nodiscard]] float between(int face, int x, int y) const {
+        constexpr float like_normals = 0.99F, steps = 2; // 8 degrees; neighbours on the surface are a step away
+        const Eigen::Vector3f here = surface_.local(face, x, y);
+        float sum = 0, count = 0;
+        for (const auto& [i, j] : {std::pair(x - 1, y), {x + 1, y}, {x, y - 1}, {x, y + 1}}) {
+            if (std::min(i, j) < 0 || std::max(i, j) >= texels_.size)
+                continue;
+            const std::int32_t other = texels_.face[texels_.index(i, j)];
+            if (other < 0 || std::isnan(values_(j, i)) ||
+                surface_.normal(face).dot(surface_.normal(other)) < like_normals ||
+                (surface_.local(other, i, j) - here).norm() > steps * surface_.step(face))
+                continue;
+            sum += values_(j, i);
+            ++count;
+        }
+        return count > 1 ? sum / count : rays_.at(face, x, y);
+    }
+
+    const Texels& texels_;
+    const TexelSurface& surface_;
+    const TexelRays& rays_;
+    bool half_;
+    cv::Mat1f values_;
+};
 
 /// Puts the mean over all that claim a texel into it.
 void add_shared(const Texels& texels, const TexelRays& rays, cv::Mat1f& values) {
@@ -129,9 +174,12 @@ OcclusionTexture TextureAo::image(std::span<const TextureCorners> corners, std::
     made.overlap = texels.overlap();
     watch.lap("texels");
     const float most = static_cast<float>(means_share * options_.radius);
-    made.rays = options_.rays > 0 ? options_.rays : rays_for(most / median_step(surface, shown));
-    const TexelRays rays(surface_, surface, options_, made.rays);
-    cv::Mat1f values = alone(texels, rays);
+    const float steps = most / median_step(surface, shown);
+    made.rays = options_.rays > 0 ? options_.rays : rays_for(steps);
+    made.half =
+        options_.rays == 0 && steps >= 2 * (means_reach + 0.5F); // a mean reaches farther than visibility changes
+    const TexelRays rays(surface_, surface, options_, made.rays, made.half);
+    cv::Mat1f values = Alone(texels, surface, rays, made.half).values();
     watch.lap("rays");
     const auto noise = static_cast<float>(0.5 * std::pow(made.rays, -0.75)); // of a low-discrepancy set
     made.visibility = means_on_surface(texels, surface, values, most, noise);

@@ -15,14 +15,15 @@ namespace scanshade {
 
 struct TextureAoOptions {
     double radius = 0; ///< in the mesh's unit
-    int rays =
-        0; ///< of each texel; 0 = 8 to 64, the fewer the smaller texels are beside the radius: then means suffice
+    int rays = 0;      ///< of each texel; 0 = 8 to 64, the fewer the smaller texels are beside the radius: then means
+                       ///< suffice, at last of every second
     int seed = 0;
 };
 
 struct OcclusionTexture {
     cv::Mat1f visibility; ///< 1 where no triangle is near
     int rays = 0;         ///< as cast
+    bool half = false;    ///< by every second texel alone; others take what is between
     double overlap = 0;   ///< share of the texels that several parts of the surface use; their values are means
     std::size_t covered = 0;
     Timings timings;

@@ -187,9 +187,9 @@ class TextureFiles {
                 write_ao_integers(file, integers(made.visibility, outputs_.format == AoFormat::png8 ? CV_8U : CV_16U));
         });
         work_.row.notes.push_back(fmt::format(
-            "{}: {} x {} texels, {:.0f} % covered; {} rays from each, means on the "
-            "surface, a margin of {}.",
-            name, size, size, 100.0 * static_cast<double>(made.covered) / (1.0 * size * size), made.rays, margin));
+            "{0}: {1} x {1} texels, {2:.0f} % covered; {3} rays from {4}, means on the surface, a margin of {5}.", name,
+            size, 100.0 * static_cast<double>(made.covered) / (1.0 * size * size), made.rays,
+            made.half ? "every second" : "each", margin));
         constexpr double hardly_any = 0.01;
         at_most(work_.row.findings, Check::texture_overlap, made.overlap, hardly_any,
                 [&] { return overlap_doubt(name_of(plan.material), made.overlap); });

@@ -95,8 +95,7 @@ class SceneReader {
             read_.colours.clear();
         for (auto& set : read_.mesh.sets) // primitives without so many sets
             set.resize(read_.mesh.triangles.size(), no_place());
-        if (!normals_known_)
-            read_.mesh.reversed.clear();
+        read_.mesh.reversed.resize(normals_known_ ? read_.mesh.triangles.size() : 0); // the last may have no normals
         warn();
         return std::move(read_);
     }
@@ -138,7 +137,7 @@ class SceneReader {
         while (!left.empty()) {
             const auto [index, above] = left.back();
             left.pop_back();
-            during(fmt::format("node {}", index), [&, at = index, parent = above] {
+            within(fmt::format("node {}", index), [&, at = index, parent = above] {
                 const OrderedJson& node = element_of(json_, "nodes", at);
                 if (visited_[at])
                     throw Error("met twice, but nodes have one parent");
@@ -157,7 +156,7 @@ class SceneReader {
 
     void add_mesh(const OrderedJson& mesh, const Eigen::Affine3d& place) {
         for (std::size_t i = 0; i < size_of_table(mesh, "primitives"); ++i)
-            during(fmt::format("primitive {}", i), [&] {
+            within(fmt::format("primitive {}", i), [&] {
                 const OrderedJson& primitive = mesh["primitives"][i];
                 refuse_splats(primitive);
                 skins_ += primitive.contains("targets");
@@ -318,9 +317,9 @@ class SceneReader {
 } // namespace
 
 MeshFile read_gltf(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
-    return during(file.string(), [&] {
+    return within(file.string(), [&] {
         const GltfFile gltf = gltf_file(bytes, file);
-        return with_json([&] { return SceneReader(gltf, file, warnings).read(); });
+        return SceneReader(gltf, file, warnings).read();
     });
 }
 

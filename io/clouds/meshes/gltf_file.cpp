@@ -101,7 +101,7 @@ std::size_t width_of(const std::string& type) {
 
 void read_buffers(GltfFile& made, std::string_view bin, const fs::path& file) {
     for (std::size_t i = 0; i < size_of_table(made.json, "buffers"); ++i)
-        during(fmt::format("buffer {}", i), [&] {
+        within(fmt::format("buffer {}", i), [&] {
             const OrderedJson& buffer = element_of(made.json, "buffers", i);
             const std::size_t length = whole_in(buffer, "byteLength");
             made.buffers.push_back(i == 0 && made.has_bin ? std::string(bin)
@@ -173,20 +173,17 @@ GltfFile gltf_file(std::string_view bytes, const fs::path& file, bool with_buffe
         }
         made.chunks = bytes.substr(std::min<std::size_t>(at, bytes.size()));
     }
-    with_json([&] {
-        made.json = shallow_json<OrderedJson>(text);
-        if (!made.json.is_object() || !made.json.contains("asset"))
-            throw Error("JSON without \"asset\", which glTF has");
-        const std::string version = made.json["asset"].value("version", "none");
-        if (!version.starts_with("2."))
-            throw Error(fmt::format("glTF of version {}, expected 2.0", in_quotes(version)));
-        made.has_bin =
-            made.has_bin && size_of_table(made.json, "buffers") > 0 && !made.json["buffers"][0].contains("uri");
-        if (with_buffers)
-            read_buffers(made, bin, file);
-        else if (made.has_bin)
-            made.buffers.emplace_back(bin);
-    });
+    made.json = shallow_json<OrderedJson>(text);
+    if (!made.json.is_object() || !made.json.contains("asset"))
+        throw Error("JSON without \"asset\", which glTF has");
+    const std::string version = made.json["asset"].value("version", "none");
+    if (!version.starts_with("2."))
+        throw Error(fmt::format("glTF of version {}, expected 2.0", in_quotes(version)));
+    made.has_bin = made.has_bin && size_of_table(made.json, "buffers") > 0 && !made.json["buffers"][0].contains("uri");
+    if (with_buffers)
+        read_buffers(made, bin, file);
+    else if (made.has_bin)
+        made.buffers.emplace_back(bin);
     return made;
 }
 
@@ -211,7 +208,7 @@ std::string glb_bytes(const OrderedJson& json, std::string bin, std::string_view
 }
 
 Accessor::Accessor(const GltfFile& file, std::size_t index) {
-    during(fmt::format("accessor {}", index), [&] {
+    within(fmt::format("accessor {}", index), [&] {
         const OrderedJson& row = element_of(file.json, "accessors", index);
         count_ = whole_in(row, "count");
         type_ = whole_in(row, "componentType");

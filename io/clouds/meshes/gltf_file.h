@@ -31,14 +31,16 @@ struct GltfFile {
 /// A GLB of these parts.
 [[nodiscard]] std::string glb_bytes(const OrderedJson& json, std::string bin, std::string_view chunks);
 
-/// Runs `action`; what the JSON library throws becomes an Error.
+/// during(), and what the JSON library throws becomes an Error.
 template <class Action>
-decltype(auto) with_json(Action&& action) {
-    try {
-        return std::forward<Action>(action)();
-    } catch (const OrderedJson::exception& wrong) {
-        throw Error(json_problem(wrong.id, wrong.what()));
-    }
+decltype(auto) within(const std::string& what, Action&& action) {
+    return during(what, [&]() -> decltype(auto) {
+        try {
+            return std::forward<Action>(action)();
+        } catch (const OrderedJson::exception& wrong) {
+            throw Error(json_problem(wrong.id, wrong.what()));
+        }
+    });
 }
 
 /// object[key] as a whole number; `usual` where it is missing. Throws Error for anything else.

@@ -58,42 +58,40 @@ std::string as_uri(std::string_view name) {
 
 LinkedFiles linked_gltf(std::string_view bytes, const fs::path& file, const std::string& name, const TexturedMesh& mesh,
                         std::span<const OcclusionLink> links, bool replace) {
-    return during(file.string(), [&] {
+    return within(file.string(), [&] {
         GltfFile gltf = gltf_file(bytes, file, false);
-        return with_json([&] {
-            LinkedFiles made;
-            OrderedJson& json = gltf.json;
-            add_copies(json, made);
-            for (std::size_t i = 0; i < size_of_table(json, "materials"); ++i)
-                if (const std::string mode = json["materials"][i].value("alphaMode", "OPAQUE"); mode != "OPAQUE")
-                    made.notes.push_back(fmt::format("material {} is drawn as alphaMode {}, but its faces occlude as "
-                                                     "solid ones do.",
-                                                     in_quotes(json["materials"][i].value("name", "")), mode));
-            std::string bin = gltf.has_bin ? gltf.buffers[0] : "";
-            if (gltf.has_bin) // what the chunk has beyond is padding
-                bin.resize(std::min(bin.size(), whole_in(json["buffers"][0], "byteLength")));
-            else if (gltf.binary && size_of_table(json, "buffers") == 0)
-                json["buffers"] = OrderedJson::array({{{"byteLength", 0}}});
-            const bool inside = gltf.binary && (gltf.has_bin || !json["buffers"][0].contains("uri"));
-            for (const OcclusionLink& link : links) {
-                if (mesh.materials[link.material].set && !replace)
-                    throw Error(fmt::format("material {} has an occlusionTexture already; --overwrite-occlusion "
-                                            "replaces it",
-                                            in_quotes(mesh.materials[link.material].name)));
-                if (link.material == size_of_table(json, "materials"))
-                    give_material(json, appended(json, "materials", OrderedJson::object()));
-                const std::size_t image =
-                    inside ? appended(json, "images",
-                                      {{"bufferView", stored(json, bin, link.png)}, {"mimeType", "image/png"}})
-                           : appended(json, "images", {{"uri", as_uri(link.image)}});
-                const std::size_t texture = appended(json, "textures", {{"source", image}});
-                OrderedJson& occlusion = json["materials"][link.material]["occlusionTexture"];
-                occlusion = {{"index", texture}, {"texCoord", link.set}, {"strength", 1}};
-            }
-            made.files.push_back({name + (gltf.binary ? ".glb" : ".gltf"),
-                                  gltf.binary ? glb_bytes(json, std::move(bin), gltf.chunks) : json.dump(2)});
-            return made;
-        });
+        LinkedFiles made;
+        OrderedJson& json = gltf.json;
+        add_copies(json, made);
+        for (std::size_t i = 0; i < size_of_table(json, "materials"); ++i)
+            if (const std::string mode = json["materials"][i].value("alphaMode", "OPAQUE"); mode != "OPAQUE")
+                made.notes.push_back(fmt::format("material {} is drawn as alphaMode {}, but its faces occlude as "
+                                                 "solid ones do.",
+                                                 in_quotes(json["materials"][i].value("name", "")), mode));
+        std::string bin = gltf.has_bin ? gltf.buffers[0] : "";
+        if (gltf.has_bin) // what the chunk has beyond is padding
+            bin.resize(std::min(bin.size(), whole_in(json["buffers"][0], "byteLength")));
+        else if (gltf.binary && size_of_table(json, "buffers") == 0)
+            json["buffers"] = OrderedJson::array({{{"byteLength", 0}}});
+        const bool inside = gltf.binary && (gltf.has_bin || !json["buffers"][0].contains("uri"));
+        for (const OcclusionLink& link : links) {
+            if (mesh.materials[link.material].set && !replace)
+                throw Error(fmt::format("material {} has an occlusionTexture already; --overwrite-occlusion "
+                                        "replaces it",
+                                        in_quotes(mesh.materials[link.material].name)));
+            if (link.material == size_of_table(json, "materials"))
+                give_material(json, appended(json, "materials", OrderedJson::object()));
+            const std::size_t image =
+                inside
+                    ? appended(json, "images", {{"bufferView", stored(json, bin, link.png)}, {"mimeType", "image/png"}})
+                    : appended(json, "images", {{"uri", as_uri(link.image)}});
+            const std::size_t texture = appended(json, "textures", {{"source", image}});
+            OrderedJson& occlusion = json["materials"][link.material]["occlusionTexture"];
+            occlusion = {{"index", texture}, {"texCoord", link.set}, {"strength", 1}};
+        }
+        made.files.push_back({name + (gltf.binary ? ".glb" : ".gltf"),
+                              gltf.binary ? glb_bytes(json, std::move(bin), gltf.chunks) : json.dump(2)});
+        return made;
     });
 }
 
