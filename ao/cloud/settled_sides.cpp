@@ -138,7 +138,7 @@ void SettledSides::decide_by_scanner(const CloudSurface& surface, Sides& found) 
     }
     if (facing > (1 - most) * all && facing < most * all)
         return;
-    found.finding->doubt.clear();
+    found.finding->sentence.clear();
     found.why = "to the scanner's position, which decides between both sides";
     if (facing < most * all)
         for (std::int8_t& sign : found.sign)

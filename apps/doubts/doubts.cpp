@@ -61,7 +61,7 @@ void check_shares(const ComputedFrame& computed, Findings& findings) {
                                            "occlude.",
                                            100 * computed.valid_share);
                     });
-    if (image && computed.valid_share >= least_share && !computed.depth.z_m.empty()) {
+    if (image && !computed.depth.z_m.empty()) {
         const auto shares = neighboured(computed.depth.z_m);
         const double least = std::min(shares[0], shares[1]);
         at_least(findings, Check::scattered_pixels, least, least_neighboured, [&] {

@@ -347,28 +347,27 @@ std::vector<std::string> write_manifest(const std::filesystem::path& file, const
     return left_alone;
 }
 
-void write_checks(const std::filesystem::path& file, const RunReport& report,
-                  const std::function<FrameRow(const FrameRow&)>& whole) {
+void write_checks(const std::filesystem::path& file, const std::function<void(const AddChecks&)>& rows) {
     json checks = json::object();
     for (const CheckRow& row : all_checks())
         checks[row.name] = {{"of", row.subject}, {"value", row.statistic}, {"doubtful", row.doubtful}};
+    const auto number = [](double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : "null"; };
     write_atomically(file, [&](const std::filesystem::path& target) {
         std::ofstream stream(target, std::ios::binary);
         stream.exceptions(std::ios::failbit | std::ios::badbit);
         stream << "{\n  \"checks\": " << indented(text_of(checks), "  ") << ",\n  \"frames\": [";
         const char* between = "";
-        for (const FrameRow& row : report.frames) {
-            json found = json::array();
-            for (const Finding& finding : whole(row).findings)
-                found.push_back({{"check", row_of(finding.check).name},
-                                 {"value", known(finding.value, 6)},
-                                 {"limit", known(finding.limit, 6)},
-                                 {"doubtful", is_doubt(finding)}});
-            stream << std::exchange(between, ",") << "\n    "
-                   << json{{"index", row.index}, {"name", row.name}, {"found", found}}.dump(
-                          -1, ' ', false, json::error_handler_t::replace);
-        }
-        stream << (report.frames.empty() ? "]\n}\n" : "\n  ]\n}\n");
+        rows([&](const FrameRow& row) {
+            std::string found; // by hand: values of JSON for each number would take a tenth of a fast run
+            for (const Finding& finding : row.findings)
+                fmt::format_to(std::back_inserter(found), R"({}{{"check":"{}","value":{},"limit":{},"doubtful":{}}})",
+                               found.empty() ? "" : ",", row_of(finding.check).name, number(finding.value),
+                               number(finding.limit), is_doubt(finding));
+            stream << std::exchange(between, ",") << "\n    {\"index\":" << row.index
+                   << ",\"name\":" << json(row.name).dump(-1, ' ', false, json::error_handler_t::replace)
+                   << ",\"found\":[" << found << "]}";
+        });
+        stream << (*between ? "\n  ]\n}\n" : "]\n}\n");
         stream.flush();
     });
 }

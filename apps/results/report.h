@@ -80,10 +80,10 @@ void write_frames_csv(const std::filesystem::path& file, const std::vector<Frame
 std::vector<std::string> write_manifest(const std::filesystem::path& file, const RunReport& report,
                                         const std::function<FrameRow(const FrameRow&)>& whole);
 
-/// What every check found in every frame, doubtful or not: the first member describes the checks. `whole` as for
-/// write_manifest(). Atomic.
-void write_checks(const std::filesystem::path& file, const RunReport& report,
-                  const std::function<FrameRow(const FrameRow&)>& whole);
+/// What every check found in every frame, doubtful or not: the first member describes the checks. `rows` calls its
+/// argument with each whole row. Atomic.
+using AddChecks = std::function<void(const FrameRow&)>;
+void write_checks(const std::filesystem::path& file, const std::function<void(const AddChecks&)>& rows);
 
 /// How many of the rows have that status.
 [[nodiscard]] std::size_t count(const std::vector<FrameRow>& rows, FrameStatus status);

@@ -230,15 +230,17 @@ void CaptureRuns::report_on(const CaptureJob& job, Prepared& ready, const Journa
                 fmt::format("The results are in {}/: the page has numbers, no images.", tar_folder));
         report.peak_mib = peak_memory_mib();
         write_frames_csv(files.table, report.frames);
-        const auto whole_row = [&](const FrameRow& row) { return journal.whole(row); };
-        write_checks(files.checks, report, whole_row);
         page::RunPage page;
-        say_left_alone(write_manifest(files.manifest, report, [&](const FrameRow& row) {
-            FrameRow whole = journal.whole(row);
-            if (writes_page(job))
-                page.add(page_row(whole, job.capture.entries.at(row.index), job.capture.unit));
-            return whole;
-        }));
+        write_checks(files.checks,
+                     [&](const AddChecks& add_checks) { // one pass: each row is read back from the journal
+                         say_left_alone(write_manifest(files.manifest, report, [&](const FrameRow& row) {
+                             FrameRow whole = journal.whole(row);
+                             add_checks(whole);
+                             if (writes_page(job))
+                                 page.add(page_row(whole, job.capture.entries.at(row.index), job.capture.unit));
+                             return whole;
+                         }));
+                     });
         if (writes_page(job)) {
             json head = manifest_head(report);
             if (recorded)

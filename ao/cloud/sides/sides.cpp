@@ -112,10 +112,11 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
         decision.sure = room ? sure_room : body && (!like_room || too_low);
         decision.finding = {Check::room_or_body, decision.sure ? 0.0 : 1.0, 0.5, {}};
         if (!decision.sure)
-            decision.finding->doubt = fmt::format("both sides of all surfaces could be the scanned one, as of a room "
-                                                  "and of a body of its shape: the {} one was taken; --cloud.outside "
-                                                  "sets it.",
-                                                  room ? "inner" : "outer");
+            decision.finding->sentence =
+                fmt::format("both sides of all surfaces could be the scanned one, as of a room "
+                            "and of a body of its shape: the {} one was taken; --cloud.outside "
+                            "sets it.",
+                            room ? "inner" : "outer");
     } else {
         decision.sign = covered;
         decision.why = "to where a scanner could stand: " + explained(covered);
@@ -123,7 +124,7 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
         const bool known_otherwise = sure_body || (covered == inner && boxed > walled);
         decision.finding = {Check::both_sides, margin, near_tie, {}};
         if (margin < near_tie && !known_otherwise)
-            decision.finding->doubt =
+            decision.finding->sentence =
                 fmt::format("the other side of all surfaces explains the cloud nearly as well ({:.0f} % against {:.0f} "
                             "%); --cloud.outside sets it.",
                             100 * shares[at(-covered)], 100 * shares[at(covered)]);

@@ -26,7 +26,7 @@ struct Sides {
     std::string why;                  ///< in words; empty where the rule says it all
     std::optional<Finding> finding{}; ///< whether one answer explains the cloud better than the other; none = by rule
     bool sure = false;                ///< a room or a body, and nothing else would do
-    [[nodiscard]] bool doubted() const { return finding && !finding->doubt.empty(); }
+    [[nodiscard]] bool doubted() const { return finding && !finding->sentence.empty(); }
     /// Shares of the cloud that stations explain with these sides, and with those given: if asked for, and where
     /// stations were looked for.
     std::optional<double> explained{}, explained_as_given{};
