@@ -259,7 +259,8 @@ TEST_F(BatchTest, several_methods_take_a_frame_each_and_rows_keep_their_order) {
 
 TEST_F(BatchTest, one_lost_device_of_three_ends_the_run) {
     const Capture recorded = capture(24);
-    HalfOpen sound, as_sound, lost([](int call) {
+    const auto slow = [](int) { std::this_thread::sleep_for(std::chrono::milliseconds(10)); }; // so that all are used
+    HalfOpen sound(slow), as_sound(slow), lost([](int call) {
         if (call == 1)
             throw DeviceLost("the device is lost");
     });

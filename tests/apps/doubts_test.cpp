@@ -79,7 +79,8 @@ TEST(doubts, few_pixels_with_a_depth_or_a_value) {
             if ((7 * u + 13 * v) % 5 != 0)
                 few.work.depth.z_m(v, u) = 0;
     EXPECT_TRUE(warned(few.warnings(), "only 19.0 % of the pixels hold a depth"));
-    EXPECT_TRUE(few.doubts().empty()) << "holes cost precision";
+    EXPECT_FALSE(warned(few.doubts(), "hold a depth")) << "holes cost precision";
+    EXPECT_TRUE(warned(few.doubts(), "only 0 % of the valid pixels have a valid one")) << "these pixels stand alone";
     few.work.depth.z_m = whole;
     few.row.valid_share = 0.21;
     EXPECT_TRUE(few.warnings().empty());
@@ -105,7 +106,7 @@ TEST(doubts, noise_as_large_as_the_radius) {
     EXPECT_TRUE(noisy.warnings().empty()) << tests::joined(noisy.warnings());
     noisy.radius_m = 0.05;
     EXPECT_TRUE(warned(noisy.warnings(), "noise is above a quarter of the radius"));
-    EXPECT_TRUE(noisy.doubts().empty()) << "noise costs precision";
+    EXPECT_FALSE(warned(noisy.doubts(), "noise is above")) << "noise costs precision";
 }
 
 TEST(doubts, depths_in_steps_that_the_radius_feels) {
