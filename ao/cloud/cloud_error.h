@@ -26,7 +26,7 @@ struct CloudErrorSigns {
     float side = recorded; ///< how sure its side is, 0 .. 1; 0 = unknown
     /// RMS error that the check on a part expects of its surroundings; NaN = nothing was checked.
     float repeat = std::numeric_limits<float>::quiet_NaN();
-    float back = 0; ///< BackShare::near; 0 where no noise was found
+    float back = 0; ///< BackShare::near, 0 where no noise was found; with back_of_lines()
 };
 
 /// What the check needs of a point's signs, in two bytes.
@@ -64,6 +64,9 @@ struct CloudErrorTables {
 
 /// What layers add to the square.
 [[nodiscard]] float layers_square(float back);
+/// The share of backs that adds as much to the square as do lines of points, as the rings of a spinning lidar, between
+/// which things are not seen. `share`: of the points, share_on_lines().
+[[nodiscard]] float back_of_lines(double share);
 
 /// RMS of visibility, 0 .. 1.
 [[nodiscard]] float expected_error(const CloudErrorSigns& signs, const CloudErrorTables& tables);

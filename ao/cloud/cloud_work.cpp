@@ -356,7 +356,7 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
     CloudSurface& surface = planes.surface;
     FittedCloud& fitted = planes.points;
     if (role_ == Role::cloud)
-        check_lines(surface);
+        note_lines(surface);
     const std::vector<std::uint32_t> lonely = drop_strays(surface, decided_.extent.centre, result_.spacing);
     std::optional<DiscRays> rays;
     std::vector<float> side_known;
@@ -455,6 +455,7 @@ void CloudWork::attach(const Fitted& planes, const Untouched<float>& values, con
     const float radius = reach();
     require_results();
     const CloudErrorTables& errors = shipped_cloud_errors();
+    const float of_lines = back_of_lines(lines_);
     const auto give = [&](std::size_t index, std::size_t point) {
         result_.visibility[point] = values[index];
         result_.normals[point] = surface.normals[index];
@@ -467,7 +468,7 @@ void CloudWork::attach(const Fitted& planes, const Untouched<float>& values, con
                                     .side = side_known.empty() ? CloudErrorSigns::recorded
                                             : has_plane        ? side_known[index]
                                                                : 0,
-                                    .back = backs.empty() ? 0.0F : backs[index]};
+                                    .back = backs.empty() ? of_lines : std::hypot(backs[index], of_lines)};
         result_.error[point] =
             kept_signs_.empty() ? expected_error(signs, errors) : factor_of_surroundings(signs, errors);
         if (!kept_signs_.empty())
@@ -534,15 +535,14 @@ void CloudWork::turn_to_cameras(CloudSurface& surface, const FittedCloud& fitted
     });
 }
 
-void CloudWork::check_lines(const CloudSurface& surface) {
-    // 0.17 .. 0.6 in sweeps of 64 and 16 lasers along a street, 0.1 in a scan from a tripod.
-    constexpr double many = 0.15;
-    const double share = share_on_lines(surface);
-    at_most(result_.findings, Check::points_on_lines, share, many, [&] {
-        return fmt::format("{:.0f} % of the points have all near neighbours on a line, as in the rings of a spinning "
-                           "lidar: planes across the lines are guesses. Several sweeps in one cloud fill the gaps.",
-                           100 * share);
-    });
+void CloudWork::note_lines(const CloudSurface& surface) {
+    constexpr double many = 0.15; // 0.17 .. 0.6 in sweeps of 64 and 16 lasers along a street, 0.1 from a tripod
+    lines_ = share_on_lines(surface);
+    if (lines_ > many)
+        result_.notes.push_back(fmt::format("{:.0f} % of the points have all near neighbours on a line, as in the "
+                                            "rings of a spinning lidar: what lies between is not seen, which the "
+                                            "expected error has. Several sweeps in one cloud fill the gaps.",
+                                            100 * lines_));
 }
 
 /// Neighbours and planes of these points, without their noise.

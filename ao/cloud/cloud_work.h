@@ -169,7 +169,7 @@ class CloudWork {
                 const std::vector<float>& backs, const Indices& round, const Wanted& wanted);
     [[nodiscard]] std::vector<float> sides_as_in_whole(CloudSurface& surface) const;
     void turn_to_cameras(CloudSurface& surface, const FittedCloud& fitted, const Indices& round);
-    void check_lines(const CloudSurface& surface);
+    void note_lines(const CloudSurface& surface);
     [[nodiscard]] Fitted planes_of(const Indices& which, CloudGpu* gpu);
     [[nodiscard]] bool recorded() const;
     void tell();
@@ -194,7 +194,7 @@ class CloudWork {
     std::vector<Twin> twins_; ///< copies of points, in neither
     bool normals_refused_;
     FittedCounts fitted_;
-    double error_by_check_ = 0;
+    double error_by_check_ = 0, lines_ = 0; ///< share_on_lines()
     int gpu_tiles_ = 0;
 };
 

@@ -127,7 +127,7 @@ void SettledSides::turn_to(CloudSurface& surface, const std::function<Vector3d(s
 
 void SettledSides::decide_by_scanner(const CloudSurface& surface, Sides& found) const {
     constexpr double most = 0.85;
-    if (!found.doubted() || !seen_from)
+    if (found.sure || !found.finding || !seen_from)
         return;
     const Vector3f scanner = (*seen_from - surface.middle).cast<float>();
     double facing = 0, all = 0;
@@ -136,8 +136,12 @@ void SettledSides::decide_by_scanner(const CloudSurface& surface, Sides& found) 
         facing += towards > 0;
         all += towards != 0;
     }
-    if (facing > (1 - most) * all && facing < most * all)
+    if (facing > (1 - most) * all && facing < most * all) {
+        found.finding->sentence = fmt::format("{:.0f} % of the surfaces face the scanner's position, so it tells "
+                                              "neither side; --cloud.outside sets them.",
+                                              100 * facing / all);
         return;
+    }
     found.finding->sentence.clear();
     found.why = "to the scanner's position, which decides between both sides";
     if (facing < most * all)

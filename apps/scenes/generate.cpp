@@ -293,6 +293,8 @@ std::vector<std::string> names_of(const std::vector<Row>& table) {
 scene::SceneCloud cloud_from(const GenerateOptions& options, const scene::World& world) {
     const auto points = static_cast<std::size_t>(options.cloud);
     const scene::ScannerOptions& scanner = options.scanner;
+    if (scanner.rings > 0 && scanner.stations == 0)
+        throw Misuse("cloud-rings: a spinning lidar stands at a station, so --cloud-stations is needed, too");
     if (options.cloud_frames == 0)
         return scene::scanned_cloud(world, points, scanner, options.seed);
     if (scanner.stations > 0 || scanner.noise_m > 0 || scanner.noise_per_m > 0 || scanner.beam_rad > 0)

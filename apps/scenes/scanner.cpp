@@ -15,11 +15,15 @@ enum Purpose : std::uint32_t { shift = 101, turn, across, along, beam_turn, beam
 
 /// Beams of equal angles; half a step of jitter, so that no pattern is common to all stations.
 struct Grid {
-    static constexpr double lowest = -70 * std::numbers::pi / 180, highest = std::numbers::pi / 2;
+    double lowest, highest;
     int rows, columns;
 
-    explicit Grid(double beams)
-        : rows(std::max(1, static_cast<int>(std::sqrt(beams * (highest - lowest) / (2 * std::numbers::pi))))),
+    Grid(double beams, int rings)
+        : lowest((rings > 0 ? -25 : -70) * std::numbers::pi / 180),
+          highest((rings > 0 ? 15 : 90) * std::numbers::pi / 180),
+          rows(rings > 0
+                   ? rings
+                   : std::max(1, static_cast<int>(std::sqrt(beams * (highest - lowest) / (2 * std::numbers::pi))))),
           columns(std::max(1, static_cast<int>(beams / rows))) {}
 
     [[nodiscard]] Vector3d direction(int column, int row) const {
@@ -35,8 +39,8 @@ Hit first_surface(const World& world, const Vector3d& eye, const Vector3d& direc
 }
 
 /// The share of all beams that meet a surface.
-double share_met(const World& world, const std::vector<Vector3d>& eyes) {
-    const Grid grid(4000);
+double share_met(const World& world, const std::vector<Vector3d>& eyes, int rings) {
+    const Grid grid(4000, rings);
     std::size_t met = 0, all = 0;
     for (const Vector3d& eye : eyes)
         for (int row = 0; row < grid.rows; ++row)
@@ -99,6 +103,11 @@ Eigen::Isometry3d misalignment(const ScannerOptions& options, const Vector3d& ey
 
 std::vector<Parameter> ScannerOptions::parameters() {
     return {
+        {.name = "rings",
+         .help = "lasers of a spinning lidar at each station, between 25 degrees down and 15 up; 0 = equal angles",
+         .value = &rings,
+         .low = 0,
+         .high = 1000},
         {.name = "stations",
          .help = "places on the scene's walk that a simulated scanner stands at; 0 = points of equal density",
          .value = &stations,
@@ -144,7 +153,8 @@ SceneCloud scanned_cloud(const World& world, std::size_t count, const ScannerOpt
     const Walk& walk = world.scene().walk;
     for (int i = 0; i < options.stations; ++i)
         cloud.stations.push_back(world_from_camera(walk, walk.period_s * i / options.stations).translation());
-    const Grid grid(static_cast<double>(count) / options.stations / share_met(world, cloud.stations));
+    const Grid grid(static_cast<double>(count) / options.stations / share_met(world, cloud.stations, options.rings),
+                    options.rings);
     std::vector<Record> records(static_cast<std::size_t>(grid.rows) * static_cast<std::size_t>(grid.columns));
     for (int station = 0; station < options.stations; ++station) {
         const Vector3d& eye = cloud.stations[static_cast<std::size_t>(station)];

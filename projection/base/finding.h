@@ -49,16 +49,13 @@ enum class Check : std::uint8_t {
     // clouds
     radius_in_spacings,
     radius_in_cloud,
-    points_on_lines,
     noise_left,
     error_by_part,
     normals_to_station,
     normals_to_scanner,
     normals_to_space,
     normals_to_sky,
-    room_or_body,
-    both_sides,
-    fronts_explained,
+    sides,
     // results
     coverage,
     all_open,

@@ -265,7 +265,11 @@ TEST(Sides, an_empty_box_could_be_either) {
         p[i % 3] = i % 2 ? 1 : -1;
         box.push_back(p.cwiseProduct(Vector3d(2, 1.5, 1)) + Vector3d(10, 20, 5));
     }
-    EXPECT_FALSE(doubts_in(visibility(box).findings).empty());
+    const PointVisibility alone = visibility(box);
+    const auto sides = std::ranges::find(alone.findings, Check::sides, &Finding::check);
+    ASSERT_NE(sides, alone.findings.end());
+    EXPECT_GT(sides->value, 0.02) << "as high as a room, it is most likely one";
+    EXPECT_LT(sides->value, 0.1);
     for (const bool within : {true, false}) { // a sweep's scanner decides
         const Vector3d scanner = within ? Vector3d(10.4, 19.7, 5.1) : Vector3d(90, 40, 25);
         const auto swept = CloudAo({.radius = 0.5}).compute({box, {}, {}, false, true}, scanner);
@@ -342,11 +346,17 @@ TEST(Sides, an_angular_body_too_low_for_a_room_is_none_and_its_recorded_normals_
     EXPECT_EQ(wrong_sides(recorded, block.normals).all, 0);
 }
 
-/// As high as a room, it is taken for one, and that is a guess.
-TEST(Sides, an_empty_room_of_several_parts_could_be_a_body) {
+/// As high as a room, it is taken for one; lower, it is doubted.
+TEST(Sides, an_empty_room_of_several_parts_is_one_by_its_height) {
     const Faces room =
         faces_of({{Vector3d(0, 0, 0), Vector3d(5, 2, 2.5)}, {Vector3d(0, 2, 0), Vector3d(2, 5, 2.5)}}, 400);
-    EXPECT_NE(doubts_of_sides(visibility(room.points)), "");
+    const auto found = visibility(room.points);
+    EXPECT_GT(wrong_sides(found, room.normals).all, 0.99) << "the faces look out";
+    EXPECT_EQ(doubts_of_sides(found), "");
+    Points low = room.points;
+    for (Vector3d& point : low)
+        point *= 0.5;
+    EXPECT_NE(doubts_of_sides(visibility(low, {}, {.radius = 0.3})), "");
 }
 
 /// Its wheels reach into it, so the places that explain it best stand within.

@@ -39,5 +39,6 @@ std::unique_ptr<Command> expected_errors_part();
 std::unique_ptr<Command> flatness_part();
 std::unique_ptr<Command> hard_cases_part();
 std::unique_ptr<Command> normals_part();
+std::unique_ptr<Command> sides_part();
 
 } // namespace scanshade::bench

@@ -45,13 +45,15 @@ struct Decision {
     double explained = 0;
     bool sure = false;
     std::optional<Finding> finding{};
+    std::optional<SideSigns> signs{};
+    bool inner = false;
 };
 
-/// What decides between a labelling and its opposite.
+/// What decides between a labelling and its opposite, besides stations.
 struct Scene {
-    const Reach& reach;
     bool up_known = false;
-    double front_meets = 0.5; ///< share of the rays that met something, that left fronts
+    float far = 0;            ///< Reach::far
+    double meets[2] = {0, 0}; ///< shares of the rays from fronts, and from backs, that meet something
     double smallest = 0;      ///< extent along the axes
 };
 
@@ -62,82 +64,50 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
     const auto labels_of = [&](int sign) -> const Signs& { return sign > 0 ? labels : other; };
     const auto at = [](int sign) { return sign > 0 ? 0 : 1; };
     const Stations::Cover covers[] = {stations.cover(labels), stations.cover(other)};
-    const double shares[] = {std::clamp(covers[0].share, 0.0, 1.0), std::clamp(covers[1].share, 0.0, 1.0)};
-    const int inner = scene.front_meets > 0.5 ? 1 : -1, covered = shares[0] >= shares[1] ? 1 : -1;
-    const double fronts = stations.fronts_from_afar(labels_of(-inner)),
-                 afar = stations.seen_from_afar(labels_of(-inner)),
-                 within = stations.density_fits(labels_of(inner), true),
-                 outside = stations.density_fits(labels_of(-inner), false), boxed = stations.boxed(scene.reach.far);
-    constexpr double scanned_within = 0.4, clearly_better = 0.1; // correlations of density with stations' distances
-    constexpr double walled = 0.3, hardly_walled = 0.1;          // shares of the points in walls that bound the cloud
-    constexpr double empty = 0.02; // of the rays that meet something, those from the outer side
-    // Between shares of points that stations explain. Through the shadows of furniture, walls are seen from behind.
-    constexpr double tie = 0.05, near_tie = 0.1, walled_tie = 0.2;
-    constexpr double hardly_explained = 0.7; // share of the points
-    constexpr double level = 0.35;           // mean rise of the fronts: terrain has it, rooms and halls have none
-    const double outer_meets = std::min(scene.front_meets, 1 - scene.front_meets);
+    const int inner = scene.meets[0] > scene.meets[1] ? 1 : -1;
+    const Stations::Cover &of_inner = covers[at(inner)], &of_outer = covers[at(-inner)];
+    const SideSigns signs{.inner_cover = of_inner.share,
+                          .outer_cover = of_outer.share,
+                          .inner_stations = static_cast<double>(of_inner.chosen.size()),
+                          .outer_stations = static_cast<double>(of_outer.chosen.size()),
+                          .inner_meets = scene.meets[at(inner)],
+                          .outer_meets = scene.meets[at(-inner)],
+                          .fronts = stations.fronts_from_afar(labels_of(-inner)),
+                          .afar = stations.seen_from_afar(labels_of(-inner)),
+                          .within = stations.density_fits(labels_of(inner)),
+                          .boxed = stations.boxed(scene.far),
+                          .rise = stations.rise(labels_of(inner)),
+                          .up_known = scene.up_known,
+                          .smallest_m = scene.smallest};
+    constexpr double level = 0.35; // mean rise of the fronts: terrain has it, rooms and halls have none
     Decision decision;
-    const double margin = std::abs(shares[0] - shares[1]);
-    const auto explained = [&](int sign) {
-        return fmt::format("{} places see {:.0f} % of the points from the front", covers[at(sign)].chosen.size(),
-                           100 * shares[at(sign)]);
-    };
+    decision.signs = signs;
     if (rule == SidesRule::outward || rule == SidesRule::inward) {
         decision.sign = rule == SidesRule::outward ? -inner : inner;
         decision.body = rule == SidesRule::outward;
-    } else if (const double rise = stations.rise(labels); rule == SidesRule::terrain && std::abs(rise) > level) {
-        decision.sign = rise > 0 ? 1 : -1;
-    } else if (const bool body = fronts >= 0.9 && afar >= 0.97; body || margin < (boxed > walled ? walled_tie : tie)) {
-        // Both sides could be the scanned one: a closed room looks like a body from outside. Walls and floors tell,
-        // less so the density of the points.
-        // What is seen from all round without a gap has nothing within, and is either. Then a room is as high as rooms
-        // are, in metres as is the custom. Of furnished rooms a few of a hundred points are not seen through gaps.
-        constexpr double lowest_room = 1.8, highest_room = 5, without_gap = 0.99;
-        const bool empty_within = afar > without_gap,
-                   as_high_as_rooms = scene.smallest > lowest_room && scene.smallest < highest_room;
-        const bool from_within = within > std::max(scanned_within, outside + clearly_better);
-        const bool room =
-            (boxed > (body ? walled : hardly_walled) && (!empty_within || as_high_as_rooms)) || from_within;
-        const bool sure_room = boxed > walled && outer_meets > empty && (!empty_within || from_within);
-        decision.sign = room ? inner : -inner;
-        decision.body = body && !room;
-        if (room)
-            decision.why = fmt::format("inward, as of a room: {}", explained(inner));
-        else if (body)
-            decision.why = fmt::format("outward, as of a body: {:.0f} % of it is seen from all round", 100 * afar);
-        else
-            decision.why = "to the outer side of a shell";
-        const bool like_room = boxed > walled || within > std::max(scanned_within, outside);
-        const bool too_low = empty_within && scene.smallest < lowest_room; // for a room without a gap
-        decision.sure = room ? sure_room : body && (!like_room || too_low);
-        decision.finding = {Check::room_or_body, decision.sure ? 0.0 : 1.0, 0.5, {}};
-        if (!decision.sure)
-            decision.finding->sentence =
-                fmt::format("both sides of all surfaces could be the scanned one, as of a room "
-                            "and of a body of its shape: the {} one was taken; --cloud.outside "
-                            "sets it.",
-                            room ? "inner" : "outer");
+    } else if (rule == SidesRule::terrain && std::abs(signs.rise) > level) {
+        decision.sign = signs.rise > 0 ? inner : -inner;
     } else {
-        decision.sign = covered;
-        decision.why = "to where a scanner could stand: " + explained(covered);
-        const bool sure_body = covered == -inner && afar > 0.97 && boxed < hardly_walled;
-        const bool known_otherwise = sure_body || (covered == inner && boxed > walled);
-        decision.finding = {Check::both_sides, margin, near_tie, {}};
-        if (margin < near_tie && !known_otherwise)
-            decision.finding->sentence =
-                fmt::format("the other side of all surfaces explains the cloud nearly as well ({:.0f} % against {:.0f} "
-                            "%); --cloud.outside sets it.",
-                            100 * shares[at(-covered)], 100 * shares[at(covered)]);
-        else if (!scene.up_known && shares[at(covered)] < hardly_explained)
-            decision.finding = {Check::fronts_explained, shares[at(covered)], hardly_explained,
-                                fmt::format("the places where a scanner could have stood see only {:.0f} % of the "
-                                            "points from the front, as among plants; --cloud.outside sets the side.",
-                                            100 * shares[at(covered)])};
+        constexpr double doubtful = 0.1, unlikely = 0.01; // probabilities of the other answer
+        const double probability = inner_probability(signs), wrong = std::min(probability, 1 - probability);
+        decision.sign = probability > 0.5 ? inner : -inner;
+        decision.body = decision.sign != inner && signs.fronts >= 0.9 && signs.afar >= 0.97;
+        decision.sure = wrong < unlikely;
+        const Stations::Cover& cover = covers[at(decision.sign)];
+        decision.why = fmt::format("{}: {} places see {:.0f} % of the points from the front",
+                                   decision.sign == inner ? "inward, as of rooms" : "outward, as of bodies and grounds",
+                                   cover.chosen.size(), 100 * std::clamp(cover.share, 0.0, 1.0));
+        decision.finding = {Check::sides, wrong, doubtful, {}};
+        if (wrong > doubtful)
+            decision.finding->sentence = fmt::format("the {} sides of all surfaces were taken, and the opposite has a "
+                                                     "chance of {:.0f} %; --cloud.outside sets them.",
+                                                     decision.sign == inner ? "inner" : "outer", 100 * wrong);
     }
+    decision.inner = decision.sign == inner;
     decision.chosen = covers[at(decision.sign)].chosen;
-    decision.explained = shares[at(decision.sign)];
+    decision.explained = std::clamp(covers[at(decision.sign)].share, 0.0, 1.0);
     if (scene.up_known && rule != SidesRule::outward && rule != SidesRule::inward && !decision.body &&
-        shares[at(decision.sign)] < 0.6) {
+        decision.explained < 0.6) {
         decision.lost = true;
         decision.finding.reset();
         decision.why = "up, since no place of a scanner explains most of the surfaces (as among plants)";
@@ -258,16 +228,16 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
     Signs of_tests;
     for (const std::uint32_t index : stations.tests())
         of_tests.push_back(static_cast<std::int8_t>(label[patches.patch[index]] * patches.sign(index)));
-    double front_meets = 0, meets = 0;
+    double meets[2] = {0, 0}; // from fronts, from backs
+    const double shot = 8.0 * static_cast<double>(std::min(effort.points, surface.size()));
     for (const RayHit& ray : hits) {
         const bool normal_side = ray.direction.dot(surface.normals[ray.from]) > 0;
-        front_meets += (label[patches.patch[ray.from]] * patches.sign(ray.from) > 0) == normal_side;
-        meets += 1;
+        const bool front = (label[patches.patch[ray.from]] * patches.sign(ray.from) > 0) == normal_side;
+        meets[front ? 0 : 1] += 1 / shot;
     }
-    Decision decision = decide(
-        stations, of_tests,
-        {reach, up.has_value(), meets > 0 ? front_meets / meets : 0.5, smallest_extent(surface, stations.tests())},
-        rule);
+    Decision decision =
+        decide(stations, of_tests,
+               {up.has_value(), reach.far, {meets[0], meets[1]}, smallest_extent(surface, stations.tests())}, rule);
     std::optional<double> as_given;
     if (effort.given_too)
         as_given = stations.cover(Signs(of_tests.size(), 1)).share;
@@ -323,6 +293,8 @@ Sides sides_of(const CloudSurface& surface, const Patches& patches, const DiscRa
     sides.why = decision.why;
     sides.finding = decision.finding;
     sides.sure = decision.sure;
+    sides.signs = decision.signs;
+    sides.inner = decision.inner;
     if (as_given) {
         sides.explained = decision.explained;
         sides.explained_as_given = as_given;

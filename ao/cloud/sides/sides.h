@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/cloud/sides/patches.h"
+#include "ao/cloud/sides/side_score.h"
 #include "ao/cloud/surface/disc_rays.h"
 #include "projection/base/finding.h"
 
@@ -24,8 +25,10 @@ struct Sides {
     std::vector<std::int8_t> sign;    ///< by index in the tree: -1 = the normal has to be turned
     std::vector<float> confidence;    ///< by index in the tree, 0 .. 1
     std::string why;                  ///< in words; empty where the rule says it all
-    std::optional<Finding> finding{}; ///< whether one answer explains the cloud better than the other; none = by rule
-    bool sure = false;                ///< a room or a body, and nothing else would do
+    std::optional<Finding> finding{}; ///< the probability of the opposite; none = by rule
+    bool sure = false;                ///< the opposite would not do
+    std::optional<SideSigns> signs{}; ///< where stations were looked for
+    bool inner = false;               ///< the inner sides were taken
     [[nodiscard]] bool doubted() const { return finding && !finding->sentence.empty(); }
     /// Shares of the cloud that stations explain with these sides, and with those given: if asked for, and where
     /// stations were looked for.

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <Eigen/Eigenvalues>
 #include <tbb/parallel_for.h>
 
 namespace scanshade {
@@ -64,7 +65,7 @@ std::vector<RayHit> shoot(const CloudSurface& surface, const DiscRays& rays, std
 
 Stations::Stations(const CloudSurface& surface, const DiscRays& rays, const std::vector<RayHit>& hits,
                    const Reach& reach, const std::optional<Vector3f>& up, const SidesEffort& effort)
-    : surface_(surface), up_(up), centre_(reach.centre) {
+    : surface_(surface), up_(up) {
     add_near(hits, reach, effort.stations);
     near_ = positions_.size();
     for (const Eigen::Vector3d& direction : spread_directions(64))
@@ -97,25 +98,40 @@ double Stations::all_seen() const {
 
 double Stations::boxed(float size) const {
     constexpr double large = 0.03, beyond_at_most = 0.02;
-    const float thick = 0.01F * size;
+    const float thick = 0.01F * size,
+                near = 5 * thick; // noise turns a plane, so the far ends of its wall are only near
+    constexpr float alike = 0.9F;
     std::vector<char> bounding(tests_.size(), 0);
+    const auto all = static_cast<double>(tests_.size());
     tbb::parallel_for(std::size_t(0), tests_.size(), [&](std::size_t t) {
-        const Vector3f& at = surface_.tree[tests_[t]];
         const Vector3f& normal = surface_.normals[tests_[t]];
+        std::vector<Vector3f> wall;
+        for (const std::uint32_t other : tests_)
+            if (std::abs((surface_.tree[other] - surface_.tree[tests_[t]]).dot(normal)) <= near &&
+                std::abs(surface_.normals[other].dot(normal)) > alike)
+                wall.push_back(surface_.tree[other]);
+        if (static_cast<double>(wall.size()) < large * all)
+            return;
+        Vector3f middle = Vector3f::Zero();
+        for (const Vector3f& at : wall)
+            middle += at / static_cast<float>(wall.size());
+        Eigen::Matrix3f spread = Eigen::Matrix3f::Zero();
+        for (const Vector3f& at : wall)
+            spread += (at - middle) * (at - middle).transpose();
+        const Vector3f across =
+            Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f>().computeDirect(spread).eigenvectors().col(0);
         std::size_t above = 0, below = 0, within = 0;
         for (const std::uint32_t other : tests_) {
-            const float height = (surface_.tree[other] - at).dot(normal);
+            const float height = (surface_.tree[other] - middle).dot(across);
             above += height > thick;
             below += height < -thick;
-            within += std::abs(height) <= thick && std::abs(surface_.normals[other].dot(normal)) > 0.98F;
+            within += std::abs(height) <= thick && std::abs(surface_.normals[other].dot(across)) > alike;
         }
-        const auto all = static_cast<double>(tests_.size());
-        bounding[t] = static_cast<double>(std::min(above, below)) <= beyond_at_most * all &&
+        bounding[t] = std::abs((surface_.tree[tests_[t]] - middle).dot(across)) <= thick &&
+                      static_cast<double>(std::min(above, below)) <= beyond_at_most * all &&
                       static_cast<double>(within) >= large * all;
     });
-    return tests_.empty() ? 0
-                          : static_cast<double>(std::count(bounding.begin(), bounding.end(), 1)) /
-                                static_cast<double>(tests_.size());
+    return tests_.empty() ? 0 : static_cast<double>(std::count(bounding.begin(), bounding.end(), 1)) / all;
 }
 
 double Stations::rise(const Signs& labels) const {
@@ -177,9 +193,9 @@ double Stations::fronts_from_afar(const Signs& labels) const {
     return all > 0 ? fronts / all : 0;
 }
 
-double Stations::density_fits(const Signs& labels, bool within) const {
+double Stations::density_fits(const Signs& labels) const {
     std::vector<std::vector<double>> made[2]; // by kind of scanner and station: density by test
-    for (std::size_t c = within ? 0 : near_; c < (within ? near_ : size()); ++c) {
+    for (std::size_t c = 0; c < near_; ++c) {
         std::size_t fronts = 0, backs = 0;
         for (std::size_t t = 0; t < tests_.size(); ++t) {
             fronts += seen(c, t, labels) > 0;
@@ -187,21 +203,18 @@ double Stations::density_fits(const Signs& labels, bool within) const {
         }
         if (10 * fronts < tests_.size() || 20 * backs > fronts + backs)
             continue;
-        for (const float nearer : within ? std::vector<float>{1} : std::vector<float>{1, 2.0F / 3, 0.45F}) {
-            const Vector3f position = centre_ + nearer * (positions_[c] - centre_);
-            for (auto& of_kind : made)
-                of_kind.emplace_back(tests_.size(), 0.0);
-            for (std::size_t t = 0; t < tests_.size(); ++t) {
-                if (seen(c, t, labels) <= 0)
-                    continue;
-                const Vector3f apart = position - surface_.tree[tests_[t]];
-                const Vector3f towards = apart.normalized();
-                const double even =
-                    static_cast<double>(std::abs(towards.dot(surface_.normals[tests_[t]])) / apart.squaredNorm());
-                const float rise = towards.dot(up_.value_or(Vector3f::UnitZ()));
-                made[0].back()[t] = even;
-                made[1].back()[t] = even / static_cast<double>(std::sqrt(std::max(1 - rise * rise, 0.01F)));
-            }
+        for (auto& of_kind : made)
+            of_kind.emplace_back(tests_.size(), 0.0);
+        for (std::size_t t = 0; t < tests_.size(); ++t) {
+            if (seen(c, t, labels) <= 0)
+                continue;
+            const Vector3f apart = positions_[c] - surface_.tree[tests_[t]];
+            const Vector3f towards = apart.normalized();
+            const double even =
+                static_cast<double>(std::abs(towards.dot(surface_.normals[tests_[t]])) / apart.squaredNorm());
+            const float rise = towards.dot(up_.value_or(Vector3f::UnitZ()));
+            made[0].back()[t] = even;
+            made[1].back()[t] = even / static_cast<double>(std::sqrt(std::max(1 - rise * rise, 0.01F)));
         }
     }
     return std::max(best_fit(made[0]), best_fit(made[1]));

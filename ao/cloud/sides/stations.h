@@ -68,11 +68,10 @@ class Stations {
     [[nodiscard]] double seen_from_afar(const Signs& labels) const;
     /// Fronts among all that far stations see.
     [[nodiscard]] double fronts_from_afar(const Signs& labels) const;
-    /// How well the density of the points is that of scans: the logarithm's correlation with that of what a few
-    /// stations would make together. Each makes cosine / distance^2, or more towards its poles, as beams of equal
-    /// angles have it. -1 where no station sees much. From `within`: near stations; else those round the cloud, at
-    /// distances that scanners round a body stand at.
-    [[nodiscard]] double density_fits(const Signs& labels, bool within) const;
+    /// How well the density of the points is that of scans from near stations: the logarithm's correlation with that of
+    /// what a few would make together. Each makes cosine / distance^2, or more towards its poles, as beams of equal
+    /// angles have it. -1 where no station sees much.
+    [[nodiscard]] double density_fits(const Signs& labels) const;
 
     /// The chosen ones first, then those that see most fronts and few backs.
     [[nodiscard]] std::vector<std::size_t> best(std::vector<std::size_t> chosen, const Signs& labels,
@@ -88,7 +87,6 @@ class Stations {
 
     const CloudSurface& surface_;
     std::optional<Eigen::Vector3f> up_;
-    Eigen::Vector3f centre_;
     std::vector<Eigen::Vector3f> positions_; ///< the near ones first
     std::size_t near_ = 0;
     std::vector<std::uint32_t> tests_;
