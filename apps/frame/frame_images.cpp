@@ -71,7 +71,7 @@ Finished finished(Work& work, const FinishInput& input, const FinishOutputs& out
 
 bool wants_confidence(const Work& work, const Outputs& outputs) {
     return outputs.confidence || outputs.error || (work.frame.cloud ? outputs.cloud : outputs.depth_cloud) ||
-           outputs.glb;
+           outputs.glb || outputs.tiles3d;
 }
 
 /// The light as the camera of that scene sees it.

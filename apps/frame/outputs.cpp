@@ -25,6 +25,7 @@ fs::path cloud_file(const std::string& name, const std::string& extension) {
     return fs::path("clouds") / (name + extension);
 }
 fs::path fields_file(const std::string& name) { return cloud_file(name, ".ao.ply"); }
+fs::path tiles_path(const std::string& name) { return fs::path("tiles") / name; }
 fs::path preview_file(const std::string& name) { return fs::path("previews") / (name + ".js"); }
 fs::path points_file(const std::string& name, std::size_t part) {
     return fs::path("points") / fmt::format("{}.{:03}.js", name, part);
@@ -67,6 +68,8 @@ std::vector<fs::path> files_of(const CaptureEntry& entry, const Outputs& outputs
         for (const std::string& end : {std::string(".obj"), std::string(".mtl"), std::string(".glb"),
                                        std::string(".gltf"), std::string(".ply"), ".ao" + extension(outputs.format)})
             add(fs::path(texture_folder) / (entry.name + end));
+    if (outputs.tiles3d)
+        add(tiles_path(entry.name) / "tileset.json");
     if (outputs.glb)
         add(cloud_file(entry.name, ".glb"));
     if (!entry.cloud.empty() && of_points(outputs).cloud)

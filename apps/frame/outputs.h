@@ -21,7 +21,7 @@ enum class CloudColours { kept, shaded, grey };
 /// The folders that Outputs fill.
 inline constexpr std::array result_folders = {"ao",       "confidence", "error",    "shaded", "unshaded",
                                               "ambient",  "direct",     "indirect", "panel",  "clouds",
-                                              "previews", "points",     "meshes"};
+                                              "previews", "points",     "meshes",   "tiles"};
 inline constexpr const char* texture_folder = "meshes";
 /// That of tars of results (result_tars.h).
 inline constexpr const char* tar_folder = "tars";
@@ -54,7 +54,9 @@ struct Outputs {
     bool depth_cloud = false; ///< a new PLY of a depth frame's points, in camera space
     bool glb = false;         ///< the points of either as binary glTF
     TextureOutput texture = {};
-    bool mcap = false; ///< all frames as one recording, run.mcap; not a file of a frame
+    bool tiles3d = false;       ///< a cloud's points as 3D Tiles, in tiles/NAME/
+    std::string tiles_crs = {}; ///< of their coordinates, as "EPSG:25832"; empty = as the file says
+    bool mcap = false;          ///< all frames as one recording, run.mcap; not a file of a frame
     AoFormat format = AoFormat::png16;
     /// Of unshaded, ambient, direct and indirect; none: PNG with as many bits as the colour image has.
     std::optional<AoFormat> colour_format = {};
@@ -81,6 +83,8 @@ struct Outputs {
 [[nodiscard]] std::filesystem::path cloud_file(const std::string& name, const std::string& extension);
 /// Of a cloud whose format has no room for fields, beside cloud_file().
 [[nodiscard]] std::filesystem::path fields_file(const std::string& name);
+/// The folder of a cloud's 3D Tiles.
+[[nodiscard]] std::filesystem::path tiles_path(const std::string& name);
 [[nodiscard]] std::filesystem::path preview_file(const std::string& name);
 [[nodiscard]] std::filesystem::path points_file(const std::string& name, std::size_t part);
 

@@ -157,6 +157,16 @@ json totals_json(const RunReport& report) {
 
 constexpr const char* whole_recording = "run.mcap"; ///< of a capture, not of a block of it
 
+/// What the folder of results lists of a file: ao/NAME.png, but of a tar's or a tileset's files these.
+std::string entry_of(const std::filesystem::path& file) {
+    std::filesystem::path entry;
+    int parts = 0;
+    for (const std::filesystem::path& part : file)
+        if (++parts <= 2)
+            entry /= part;
+    return entry.generic_string();
+}
+
 /// The files in the folders of results without those in `own`, sorted.
 std::vector<std::string> files_of_others(const std::filesystem::path& folder,
                                          const std::unordered_set<std::string>& own) {
@@ -332,8 +342,7 @@ std::vector<std::string> write_manifest(const std::filesystem::path& file, const
         for (const FrameRow& row : report.frames) {
             const FrameRow all_of_row = whole(row);
             for (const auto& each : all_of_row.files)
-                own.insert(each.begin()->string() == tar_folder ? each.parent_path().generic_string()
-                                                                : each.generic_string());
+                own.insert(entry_of(each));
             stream << std::exchange(between, ",") << "\n    "
                    << indented(text_of(frame_json(all_of_row, !report.capture.camera || report.capture.unit.arbitrary(),
                                                   report.capture.entries.at(row.index), report.capture.unit)),

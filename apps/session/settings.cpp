@@ -4,6 +4,7 @@
 #include "ao/cloud/cloud_ao.h"
 #include "apps/method_settings.h"
 #include "apps/settings_file.h"
+#include "io/rasters/geocentric.h"
 #include "projection/base/error.h"
 #include "projection/base/nearest_word.h"
 
@@ -61,8 +62,8 @@ constexpr auto maybe_quality_words = [] {
 }();
 
 std::set<std::string> words_of(const std::string& list) {
-    const std::vector<std::string> known{"ao",       "confidence", "error", "shaded", "unshaded", "light",
-                                         "indirect", "cloud",      "panel", "glb",    "mcap",     "texture"};
+    const std::vector<std::string> known{"ao",    "confidence", "error", "shaded", "unshaded", "light",  "indirect",
+                                         "cloud", "panel",      "glb",   "mcap",   "texture",  "tiles3d"};
     std::set<std::string> words;
     std::istringstream stream(list);
     for (std::string word; std::getline(stream, word, ',');) {
@@ -94,6 +95,13 @@ Outputs outputs_from(const RunSettings& asked) {
     wanted.colour_cloud = asked.colour_cloud;
     wanted.colour_view = asked.colour_view;
     wanted.texture = asked.texture;
+    wanted.tiles_crs = asked.tiles_crs;
+    if (!asked.tiles_crs.empty())
+        try {
+            (void)rasters::crs_of_code(asked.tiles_crs);
+        } catch (const Error& wrong) {
+            throw Misuse(fmt::format("tiles-crs: {}", wrong.what()));
+        }
     wanted.frames_in_tar = static_cast<std::size_t>(asked.frames_in_tar);
     wanted.preview = asked.page && asked.frames_in_tar == 0;
     wanted.page_points = page_points_from(asked.page_points);
@@ -109,9 +117,12 @@ Outputs outputs_from(const RunSettings& asked) {
         wanted.panel = words.contains("panel");
         wanted.glb = words.contains("glb");
         wanted.mcap = words.contains("mcap");
+        wanted.tiles3d = words.contains("tiles3d");
         wanted.texture.wanted = words.contains("texture");
         wanted.cloud = wanted.depth_cloud = words.contains("cloud");
     }
+    if (wanted.tiles3d && wanted.frames_in_tar > 0)
+        throw Misuse("tar: --write tiles3d makes folders whose files name each other; leave one out");
     if (wanted.mcap && wanted.frames_in_tar > 0)
         throw Misuse("tar: --write mcap puts all frames into one file, which no tar can hold in parts; leave one out");
     return wanted;
@@ -343,12 +354,12 @@ std::vector<Stage> RunSettings::common_stages() { // NOLINT(readability-function
            .affects = Affects::nothing},
           {.name = "write",
            .help =
-               "any of ao,confidence,error,shaded,unshaded,light,indirect,cloud,panel,glb,mcap,texture; auto = "
+               "any of ao,confidence,error,shaded,unshaded,light,indirect,cloud,panel,glb,mcap,texture,tiles3d; auto = "
                "ao,confidence,shaded, and cloud for clouds. error: the expected error of each value; confidence is "
                "1 - error / 0.3. unshaded: colour divided by visibility, where confidence allows it; light: ambient "
                "and direct, the parts of colour; indirect: colour that neighbours send; glb: each frame's points or "
                "mesh as binary glTF; mcap: run.mcap, all frames for Foxglove, Rerun and ROS; texture: images for the "
-               "coordinates of meshes",
+               "coordinates of meshes; tiles3d: a cloud's points for Cesium",
            .value = &s.write,
            .common = true,
            .affects = Affects::outputs},
@@ -363,6 +374,10 @@ std::vector<Stage> RunSettings::common_stages() { // NOLINT(readability-function
            .value = &s.texture.margin,
            .low = -1,
            .high = 4096,
+           .affects = Affects::outputs},
+          {.name = "tiles-crs",
+           .help = "coordinate system of a cloud for tiles3d, such as EPSG:25832, instead of the file's own",
+           .value = &s.tiles_crs,
            .affects = Affects::outputs},
           {.name = "overwrite-occlusion",
            .help = "replaces occlusion textures that a glTF has",

@@ -53,6 +53,7 @@ class RunSettings {
     std::optional<AoFormat> colour_format = {};
     bool colour_view = false;
     TextureOutput texture = {};
+    std::string tiles_crs;
     Shade shade = Shade::multiply;
     std::string light = "auto";
     double shade_strength = 1;

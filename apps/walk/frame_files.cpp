@@ -7,6 +7,7 @@
 #include "apps/page/preview.h"
 #include "apps/picture.h"
 #include "apps/results/cloud_picture.h"
+#include "apps/walk/cloud_tiles.h"
 #include "apps/walk/mesh_textures.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/glb.h"
@@ -208,6 +209,8 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
         });
     if (outputs.texture.wanted)
         write_mesh_textures(work, outputs);
+    if (outputs.tiles3d)
+        write_cloud_tiles(work, outputs);
 }
 
 std::filesystem::path write_cloud_picture(const Work& work, const Outputs& outputs) {
@@ -244,6 +247,8 @@ void remove_files(Work& work, const Outputs& outputs) {
     std::error_code gone_already;
     for (const auto& file : files_of(work.entry, outputs))
         std::filesystem::remove(file, gone_already);
+    if (outputs.tiles3d)
+        std::filesystem::remove_all(outputs.files_folder() / tiles_path(work.entry.name), gone_already);
     const auto points = [&](std::size_t part) { return outputs.files_folder() / points_file(work.entry.name, part); };
     for (std::size_t part = 0; outputs.preview && std::filesystem::remove(points(part), gone_already); ++part)
         continue;

@@ -52,6 +52,11 @@ std::string outputs_text(const Outputs& outputs) {
         text += fmt::format("strength {};", outputs.shade_strength);
     if (outputs.glb)
         text += colours + "glb;";
+    if (outputs.texture.wanted)
+        text += fmt::format("texture {} {} {};", outputs.texture.size, outputs.texture.margin,
+                            static_cast<int>(outputs.format));
+    if (outputs.tiles3d)
+        text += fmt::format("{}tiles3d {};", colours, outputs.tiles_crs);
     if (outputs.mcap) // whatever it holds follows from these
         text += fmt::format("mcap {} {} {} {};", static_cast<int>(outputs.format), colours, outputs.shade_strength,
                             outputs.colour_view);

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -43,13 +44,18 @@ std::vector<bool> kept_points(const GlbScene& scene, GlbWritten& written) {
     return kept;
 }
 
-/// Whole numbers amid the points where floats would round them by more than a quarter of a millimetre.
-Vector3d origin_of(std::span<const Vector3d> points, const std::vector<bool>& kept) {
-    constexpr double far_away = 4096;
+Eigen::AlignedBox3d box_of(std::span<const Vector3d> points, const std::vector<bool>& kept) {
     Eigen::AlignedBox3d box;
     for (std::size_t i = 0; i < points.size(); ++i)
         if (kept[i])
             box.extend(points[i]);
+    return box;
+}
+
+/// Whole numbers amid the points where floats would round them by more than a quarter of a millimetre.
+Vector3d origin_of(std::span<const Vector3d> points, const std::vector<bool>& kept) {
+    constexpr double far_away = 4096;
+    const Eigen::AlignedBox3d box = box_of(points, kept);
     if (box.isEmpty() || std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff()) <= far_away)
         return Vector3d::Zero();
     return box.center().array().round();
@@ -99,7 +105,7 @@ class Glb {
             describe_scene();
         constexpr auto replace = Json::error_handler_t::replace;
         std::string text = json_.dump(-1, ' ', false, replace);
-        text.resize((text.size() + 3) / 4 * 4, ' ');
+        text.resize((text.size() + whole() - 1) / whole() * whole(), ' ');
         constexpr std::size_t head = 12, chunk_head = 8;
         const std::size_t total = head + chunk_head + text.size() + (buffer_.empty() ? 0 : chunk_head + buffer_.size());
         std::string all;
@@ -118,6 +124,9 @@ class Glb {
     }
 
   private:
+    /// Bytes that chunks have a multiple of.
+    [[nodiscard]] std::size_t whole() const { return scene_.tile ? 8 : 4; }
+
     template <class Number>
     static void append(std::string& bytes, Number value) {
         const auto raw = std::bit_cast<std::array<char, sizeof value>>(value);
@@ -125,7 +134,7 @@ class Glb {
     }
 
     void add_all(GlbWritten& written) {
-        std::vector<std::uint32_t> indices = indices_of(written);
+        const std::vector<std::uint32_t> indices = indices_of(written);
         const bool normals = has_normals();
         written.has_normals = normals;
         require_room(indices.size(), normals);
@@ -143,8 +152,10 @@ class Glb {
         for (const AddedField& field : scene_.fields)
             add_view(field.name, float32, "SCALAR", count_,
                      [&](std::size_t i) { append(buffer_, std::isnan(field.values[i]) ? -1.0F : field.values[i]); });
+        if (scene_.tile)
+            describe_fields();
         if (indices.empty())
-            return;
+            return buffer_.resize((buffer_.size() + whole() - 1) / whole() * whole(), '\0');
         primitive_["indices"] = accessors_.size();
         describe_view(uint32, "SCALAR", indices.size(), for_indices, [&] {
             for (const std::uint32_t index : indices)
@@ -197,7 +208,7 @@ class Glb {
     }
 
     void add_positions() {
-        origin_ = origin_of(scene_.points, kept_);
+        origin_ = scene_.tile ? Vector3d(box_of(scene_.points, kept_).center()) : origin_of(scene_.points, kept_);
         Eigen::Vector3f low, high;
         low.setConstant(std::numeric_limits<float>::max());
         high.setConstant(std::numeric_limits<float>::lowest());
@@ -245,13 +256,30 @@ class Glb {
         views_.push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", buffer_.size() - at}, {"target", target}});
     }
 
+    /// _AMBIENT_OCCLUSION is the property ambient_occlusion of each point, and so on.
+    void describe_fields() {
+        Json described, named;
+        for (const AddedField& field : scene_.fields) {
+            std::string name = field.name.substr(field.name.find_first_not_of('_'));
+            std::ranges::transform(name, name.begin(),
+                                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+            described[name] = {{"type", "SCALAR"}, {"componentType", "FLOAT32"}, {"required", true}};
+            named[name] = {{"attribute", field.name}};
+        }
+        json_["extensionsUsed"].push_back("EXT_structural_metadata");
+        json_["extensions"]["EXT_structural_metadata"] = {
+            {"schema", {{"id", "scanshade"}, {"classes", {{"point", {{"properties", described}}}}}}},
+            {"propertyAttributes", Json::array({{{"class", "point"}, {"properties", named}}})}};
+        primitive_["extensions"]["EXT_structural_metadata"] = {{"propertyAttributes", {0}}};
+    }
+
     void describe_scene() {
         primitive_["material"] = 0;
         primitive_["mode"] = primitive_.contains("indices") ? triangles_mode : points_mode;
         json_["accessors"] = accessors_;
         json_["bufferViews"] = views_;
         json_["buffers"] = {{{"byteLength", buffer_.size()}}};
-        json_["extensionsUsed"] = {"KHR_materials_unlit"};
+        json_["extensionsUsed"].push_back("KHR_materials_unlit");
         json_["materials"] = {{{"name", "colours as stored"},
                                {"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 1}}},
                                {"doubleSided", true},

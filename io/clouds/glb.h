@@ -26,6 +26,9 @@ struct GlbScene {
     std::span<const cv::Vec3b> colours = {};            ///< BGR as images store them; one per point
     std::vector<AddedField> fields = {};                ///< names as glTF asks: "_AMBIENT_OCCLUSION"; NaN = unknown
     UpAxis up = UpAxis::unknown;
+    /// A content of 3D Tiles: about its middle, chunks of whole 8 bytes, and fields declared as metadata
+    /// (EXT_structural_metadata), by which viewers style.
+    bool tile = false;
 };
 
 /// What became of the scene.

@@ -178,11 +178,10 @@ TEST(Affects, every_flag_has_its_class) {
     EXPECT_EQ(flags[Affects::as_used],
               "frames camera colour poses depth-scale registered association-limit depth-noise "
               "method radius quality max-error max-ms settings ");
-    EXPECT_EQ(
-        flags[Affects::outputs],
-        "write texture-size texture-margin overwrite-occlusion format colour-format shade light shade-strength cloud "
-        "cloud-resolution "
-        "colour-cloud page page-points tar ");
+    EXPECT_EQ(flags[Affects::outputs], "write texture-size texture-margin tiles-crs overwrite-occlusion format "
+                                       "colour-format shade light shade-strength cloud "
+                                       "cloud-resolution "
+                                       "colour-cloud page page-points tar ");
     EXPECT_EQ(flags[Affects::nothing], "preset device in-flight out overwrite resume retry strict quiet log shard "
                                        "no-locks scratch scratch-limit dump ");
 }

@@ -161,6 +161,28 @@ TEST_F(ReadersTest, the_validator_has_nothing_to_say_of_clouds_meshes_and_nothin
     EXPECT_EQ(mesh["json"]["nodes"][0]["translation"][0], 5000001) << "whole metres amid the points";
 }
 
+/// An extension that the validator does not know is information.
+TEST_F(ReadersTest, the_validator_finds_no_fault_with_tiles) {
+    const tests::Points points = tests::corner(60000);
+    write_new_ply(folder / "corner.ply", points, {}, {});
+    ASSERT_EQ(run_program(fmt::format("run {} -o {} --write tiles3d --radius 0.2 --cloud.outside inward",
+                                      (folder / "corner.ply").string(), (folder / "out").string()))
+                  .exit_code,
+              0);
+    int tiles = 0;
+    for (const auto& entry : fs::directory_iterator(folder / "out/tiles/corner"))
+        if (entry.path().extension() == ".glb") {
+            const json report = report_of(entry.path());
+            EXPECT_EQ(report["issues"]["numErrors"], 0) << report["issues"].dump(1);
+            EXPECT_EQ(report["issues"]["numWarnings"], 0) << report["issues"].dump(1);
+            EXPECT_EQ(report["issues"]["numInfos"], 1) << report["issues"].dump(1);
+            EXPECT_EQ(report["issues"]["messages"][0]["pointer"], "/extensionsUsed/0");
+            EXPECT_EQ(report["json"]["extensionsUsed"][0], "EXT_structural_metadata");
+            ++tiles;
+        }
+    EXPECT_GT(tiles, 4);
+}
+
 TEST_F(ReadersTest, a_mesh_is_triangles_and_the_cloud_of_a_recording_is_points) {
     tests::write_file(folder / "roof.ply",
                       "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float "
