@@ -190,7 +190,8 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
     if (outputs.error && work.by_points && work.error.per_point.empty())
         work.row.warnings.push_back("the method estimates no errors of single points, so there is no field ao_error.");
     if (work.frame.cloud && outputs.cloud && outputs.colour_cloud == CloudColours::kept &&
-        !splats_of(*work.frame.cloud).empty() && takes_fields(*work.frame.cloud))
+        !splats_of(*work.frame.cloud).empty() && extension(*work.frame.cloud->records) == ".ply" &&
+        takes_fields(*work.frame.cloud))
         work.row.notes.push_back("ambient_occlusion comes behind the splats' own properties: what reads these by name "
                                  "opens the file, INRIA's viewer does not; --colour-cloud shaded adds none.");
     if (work.frame.cloud && outputs.cloud) {
@@ -202,7 +203,11 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
         wrote(cloud_file(name, ".ply"), [&](const auto& file) {
             write_depth_cloud(file, work, points_of_depth(work, scene, outputs), outputs.unit);
         });
-    if (outputs.glb)
+    const bool is_glb_already = work.frame.cloud && outputs.cloud && work.frame.cloud->records &&
+                                extension(*work.frame.cloud->records) == ".glb";
+    if (outputs.glb && is_glb_already)
+        work.row.notes.push_back("--write glb makes no other file: the splats' own is one.");
+    else if (outputs.glb)
         wrote(cloud_file(name, ".glb"), [&](const auto& file) {
             write_points_glb(file, work,
                              work.frame.cloud ? points_of_cloud(work, outputs) : points_of_depth(work, scene, outputs));

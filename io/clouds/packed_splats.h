@@ -51,11 +51,21 @@ class SplatTable {
 [[nodiscard]] CloudRecords read_spz(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
 [[nodiscard]] bool is_spz(std::string_view start);
+/// Binary glTF with KHR_gaussian_splatting: the splats of its scene, placed by its nodes, in glTF's axes.
+[[nodiscard]] CloudRecords read_splat_glb(std::string_view bytes, const std::filesystem::path& file,
+                                          std::vector<std::string>& warnings);
+[[nodiscard]] bool is_splat_glb(std::string_view start);
+/// The file with one more attribute for each of `additions`, _AMBIENT_OCCLUSION of ambient_occlusion, -1 for NaN; all
+/// else as it was.
+[[nodiscard]] std::string splat_glb_bytes(const CloudRecords& records, std::string points,
+                                          const std::vector<FieldAddition>& additions);
 
 // The file again with shaded colours and no other change. `visibility`: one per splat, NaN = unchanged.
 [[nodiscard]] std::string shaded_splat(const CloudRecords& records, std::span<const float> visibility, double strength);
 [[nodiscard]] std::string shaded_compressed_ply(const CloudRecords& records, std::span<const float> visibility,
                                                 double strength);
+[[nodiscard]] std::string shaded_splat_glb(const CloudRecords& records, std::span<const float> visibility,
+                                           double strength);
 [[nodiscard]] std::string shaded_spz(const CloudRecords& records, std::span<const float> visibility, double strength);
 
 /// An element of a binary little-endian PLY without lists.

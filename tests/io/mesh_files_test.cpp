@@ -103,7 +103,8 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"a.gltf",
                 R"({"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"mode": 0,
                    "attributes": {}, "extensions": {"KHR_gaussian_splatting": {"kernel": "ellipse"}}}]}]})",
-                "Gaussian splats (KHR_gaussian_splatting, kernel \"ellipse\") are not read from glTF"}));
+                "Gaussian splats (KHR_gaussian_splatting, kernel \"ellipse\") are read from .glb, PLY, .splat and "
+                ".spz, not"}));
 
 /// A GLB of one triangle in two places; one node mirrors it.
 std::string triangle_glb(bool occlusion) {

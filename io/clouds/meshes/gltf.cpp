@@ -10,7 +10,6 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <limits>
-#include <set>
 
 namespace scanshade {
 
@@ -22,60 +21,14 @@ using Eigen::Vector3d;
 
 constexpr std::size_t points_mode = 0, triangles_mode = 4, strip_mode = 5, fan_mode = 6;
 
-/// Extensions that change no positions, triangles or coordinates.
-bool is_harmless(std::string_view extension) {
-    constexpr std::array<std::string_view, 8> harmless{"KHR_materials_",
-                                                       "KHR_texture_",
-                                                       "EXT_texture_",
-                                                       "KHR_lights_",
-                                                       "KHR_mesh_quantization",
-                                                       "KHR_xmp",
-                                                       "EXT_structural_metadata",
-                                                       "EXT_mesh_features"};
-    return std::ranges::any_of(harmless, [&](std::string_view name) { return extension.starts_with(name); });
-}
-
-void refuse_extensions(const OrderedJson& json) {
-    for (std::size_t i = 0; i < size_of_table(json, "extensionsRequired"); ++i)
-        if (const auto name = json["extensionsRequired"][i].get<std::string>(); !is_harmless(name))
-            throw Error(fmt::format("the file requires {}, which is not read; export it without", in_quotes(name)));
-}
-
 void refuse_splats(const OrderedJson& primitive) {
     const auto extensions = primitive.find("extensions");
     if (extensions == primitive.end() || !extensions->contains("KHR_gaussian_splatting"))
         return;
     const std::string kernel = (*extensions)["KHR_gaussian_splatting"].value("kernel", "");
-    throw Error(fmt::format("Gaussian splats (KHR_gaussian_splatting, kernel {}) are not read from glTF; PLY, .splat "
-                            "and .spz are",
+    throw Error(fmt::format("Gaussian splats (KHR_gaussian_splatting, kernel {}) are read from .glb, PLY, .splat and "
+                            ".spz, not from JSON with files beside it",
                             in_quotes(kernel)));
-}
-
-template <std::size_t Count>
-std::array<double, Count> numbers_in(const OrderedJson& node, const char* key, std::array<double, Count> usual) {
-    const auto found = node.find(key);
-    if (found == node.end())
-        return usual;
-    if (!found->is_array() || found->size() != Count)
-        throw Error(fmt::format("\"{}\" is no array of {} numbers", key, Count));
-    for (std::size_t i = 0; i < Count; ++i)
-        usual[i] = (*found)[i].get<double>();
-    return usual;
-}
-
-Eigen::Affine3d placed_by(const OrderedJson& node) {
-    Eigen::Affine3d place = Eigen::Affine3d::Identity();
-    if (node.contains("matrix")) {
-        const auto m = numbers_in<16>(node, "matrix", {});
-        place.matrix() = Eigen::Map<const Eigen::Matrix4d>(m.data()); // column by column
-        return place;
-    }
-    const auto t = numbers_in<3>(node, "translation", {0, 0, 0}), s = numbers_in<3>(node, "scale", {1, 1, 1});
-    const auto q = numbers_in<4>(node, "rotation", {0, 0, 0, 1});
-    const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
-    if (!(rotation.norm() > 0))
-        throw Error("\"rotation\" is no quaternion");
-    return place.translate(Vector3d(t[0], t[1], t[2])).rotate(rotation.normalized()).scale(Vector3d(s[0], s[1], s[2]));
 }
 
 class SceneReader {
@@ -88,9 +41,11 @@ class SceneReader {
         for (std::size_t i = 0; i < size_of_table(json_, "materials"); ++i)
             read_.mesh.materials.push_back(material_of(json_["materials"][i]));
         read_.mesh.materials.push_back({""}); // of primitives that name none
-        visited_.resize(size_of_table(json_, "nodes"));
-        for (const std::size_t root : roots())
-            walk(root);
+        visit_nodes(json_, [&](const OrderedJson& node, const Eigen::Affine3d& place) {
+            skins_ += node.contains("skin");
+            if (node.contains("mesh"))
+                add_mesh(element_of(json_, "meshes", whole_in(node, "mesh")), place);
+        });
         if (!colours_known_)
             read_.colours.clear();
         for (auto& set : read_.mesh.sets) // primitives without so many sets
@@ -111,47 +66,6 @@ class SceneReader {
         if (const auto texture = material.find("occlusionTexture"); texture != material.end())
             found.set = whole_in(*texture, "texCoord", 0);
         return found;
-    }
-
-    /// Of the default scene; where the file has no scene, nodes that are nobody's children.
-    std::vector<std::size_t> roots() const {
-        std::vector<std::size_t> found;
-        if (size_of_table(json_, "scenes") > 0) {
-            const OrderedJson& scene = element_of(json_, "scenes", whole_in(json_, "scene", 0));
-            for (std::size_t i = 0; i < size_of_table(scene, "nodes"); ++i)
-                found.push_back(scene["nodes"][i].get<std::size_t>());
-            return found;
-        }
-        std::set<std::size_t> children;
-        for (std::size_t i = 0; i < size_of_table(json_, "nodes"); ++i)
-            for (std::size_t k = 0; k < size_of_table(json_["nodes"][i], "children"); ++k)
-                children.insert(json_["nodes"][i]["children"][k].get<std::size_t>());
-        for (std::size_t i = 0; i < size_of_table(json_, "nodes"); ++i)
-            if (!children.contains(i))
-                found.push_back(i);
-        return found;
-    }
-
-    void walk(std::size_t root) {
-        std::vector<std::pair<std::size_t, Eigen::Affine3d>> left{{root, Eigen::Affine3d::Identity()}};
-        while (!left.empty()) {
-            const auto [index, above] = left.back();
-            left.pop_back();
-            within(fmt::format("node {}", index), [&, at = index, parent = above] {
-                const OrderedJson& node = element_of(json_, "nodes", at);
-                if (visited_[at])
-                    throw Error("met twice, but nodes have one parent");
-                visited_[at] = true;
-                const Eigen::Affine3d place = parent * placed_by(node);
-                if (node.contains("extensions") && node["extensions"].contains("EXT_mesh_gpu_instancing"))
-                    throw Error("EXT_mesh_gpu_instancing is not read");
-                skins_ += node.contains("skin");
-                if (node.contains("mesh"))
-                    add_mesh(element_of(json_, "meshes", whole_in(node, "mesh")), place);
-                for (std::size_t i = size_of_table(node, "children"); i-- > 0;)
-                    left.emplace_back(node["children"][i].get<std::size_t>(), place);
-            });
-        }
     }
 
     void add_mesh(const OrderedJson& mesh, const Eigen::Affine3d& place) {
@@ -308,7 +222,6 @@ class SceneReader {
     const OrderedJson& json_;
     const fs::path& file_;
     std::vector<std::string>& warnings_;
-    std::vector<bool> visited_;
     std::size_t lines_ = 0, skins_ = 0;
     bool colours_known_ = false, normals_known_ = false;
     MeshFile read_;

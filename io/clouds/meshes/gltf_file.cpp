@@ -4,12 +4,14 @@
 #include "io/clouds/meshes/mesh_file.h"
 #include "io/text.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <fmt/format.h>
+#include <opencv2/core.hpp>
 
 namespace scanshade {
 
@@ -89,6 +91,9 @@ std::string buffer_at(const std::string& uri, const fs::path& file) {
 
 /// Sizes of glTF's component types, from 5120 on; 5124 is none.
 constexpr std::array<std::size_t, 7> component_sizes{1, 1, 2, 2, 0, 4, 4};
+
+/// What integers of these types stand for 1 with.
+constexpr std::array<double, 6> full_of_type{127, 255, 32767, 65535, 1, 4294967295.0};
 
 std::size_t width_of(const std::string& type) {
     static const std::array<std::pair<const char*, std::size_t>, 7> widths{
@@ -207,6 +212,20 @@ std::string glb_bytes(const OrderedJson& json, std::string bin, std::string_view
     return (bytes += bin).append(chunks);
 }
 
+std::size_t appended(OrderedJson& json, const char* table, OrderedJson element) {
+    OrderedJson& all = json[table];
+    all.push_back(std::move(element));
+    return all.size() - 1;
+}
+
+std::size_t stored(OrderedJson& json, std::string& bin, std::string_view bytes) {
+    bin.resize((bin.size() + 3) / 4 * 4, '\0');
+    const std::size_t at = bin.size();
+    bin += bytes;
+    json["buffers"][0]["byteLength"] = bin.size();
+    return appended(json, "bufferViews", {{"buffer", 0}, {"byteOffset", at}, {"byteLength", bytes.size()}});
+}
+
 Accessor::Accessor(const GltfFile& file, std::size_t index) {
     within(fmt::format("accessor {}", index), [&] {
         const OrderedJson& row = element_of(file.json, "accessors", index);
@@ -235,7 +254,9 @@ Accessor::Accessor(const GltfFile& file, std::size_t index) {
                            (view_size - at - size_ * width_) / stride_ < count_ - 1))
             throw Error(fmt::format("{} from byte {} on do not fit into a buffer view of {}",
                                     counted(count_, "element"), at, counted(view_size, "byte")));
-        data_ = file.buffers[buffer].data() + view_at + at;
+        begin_ = view_at + at;
+        data_ = file.buffers[buffer].data() + begin_;
+        inside_ = file.has_bin && buffer == 0;
     });
 }
 
@@ -262,10 +283,29 @@ double Accessor::stored(const char* at) const {
 
 double Accessor::operator()(std::size_t element, std::size_t number) const {
     const double value = stored(data_ + element * stride_ + number * size_);
-    if (!fractions_ || is_float())
-        return value;
-    constexpr std::array<double, 6> full{127, 255, 32767, 65535, 1, 4294967295.0};
-    return std::max(value / full[type_ - 5120], -1.0);
+    return fractions_ && !is_float() ? std::max(value / full_of_type[type_ - 5120], -1.0) : value;
+}
+
+std::string Accessor::encoded(double value) const {
+    const auto bytes_of = []<class Number>(Number number) {
+        const auto raw = std::bit_cast<std::array<char, sizeof number>>(number);
+        return std::string(raw.data(), raw.size());
+    };
+    const double whole = fractions_ && !is_float() ? value * full_of_type[type_ - 5120] : value;
+    switch (type_) {
+    case 5120:
+        return bytes_of(cv::saturate_cast<std::int8_t>(whole));
+    case 5121:
+        return bytes_of(cv::saturate_cast<std::uint8_t>(whole));
+    case 5122:
+        return bytes_of(cv::saturate_cast<std::int16_t>(whole));
+    case 5123:
+        return bytes_of(cv::saturate_cast<std::uint16_t>(whole));
+    case 5125:
+        return bytes_of(static_cast<std::uint32_t>(std::clamp(std::round(whole), 0.0, 4294967295.0)));
+    default:
+        return bytes_of(static_cast<float>(value));
+    }
 }
 
 } // namespace scanshade

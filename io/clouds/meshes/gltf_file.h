@@ -5,7 +5,9 @@
 #include "projection/base/error.h"
 
 #include <cstddef>
+#include <Eigen/Geometry>
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -50,6 +52,20 @@ decltype(auto) within(const std::string& what, Action&& action) {
 /// The size of a table; 0 where it is missing.
 [[nodiscard]] std::size_t size_of_table(const OrderedJson& json, const char* table);
 
+/// Appends to a table of the file; returns the new element's index.
+std::size_t appended(OrderedJson& json, const char* table, OrderedJson element);
+/// Appends bytes to the BIN chunk, behind whole words; returns the index of their buffer view.
+std::size_t stored(OrderedJson& json, std::string& bin, std::string_view bytes);
+
+/// Of Gaussian splats, as points with attributes that begin so.
+inline constexpr std::string_view splat_extension = "KHR_gaussian_splatting";
+/// Throws Error where the file requires an extension that is not read.
+void refuse_extensions(const OrderedJson& json);
+/// The nodes of the default scene, parents first, each with its place in the scene; where the file has no scene, all
+/// of them. Throws Error naming the node.
+void visit_nodes(const OrderedJson& json,
+                 const std::function<void(const OrderedJson& node, const Eigen::Affine3d& place)>& visit);
+
 /// Elements of numbers, somewhere in a buffer.
 class Accessor {
   public:
@@ -63,14 +79,23 @@ class Accessor {
     [[nodiscard]] std::size_t whole(std::size_t element) const {
         return static_cast<std::size_t>(stored(data_ + element * stride_));
     }
+    /// Where a number lies in the BIN chunk, which is buffer 0.
+    [[nodiscard]] std::size_t place(std::size_t element, std::size_t number) const {
+        return begin_ + element * stride_ + number * size_;
+    }
+    /// Whether all of it lies there.
+    [[nodiscard]] bool is_inside() const { return inside_; }
+    /// A number as its bytes; the nearest that the type has.
+    [[nodiscard]] std::string encoded(double value) const;
 
   private:
     [[nodiscard]] double stored(const char* at) const;
 
     const char* data_ = nullptr;
+    std::size_t begin_ = 0; ///< of the data in its buffer
     std::size_t count_ = 0, width_ = 0, stride_ = 0, size_ = 0;
     std::size_t type_ = 0; ///< glTF's componentType
-    bool fractions_ = false;
+    bool fractions_ = false, inside_ = false;
 };
 
 } // namespace scanshade

@@ -11,22 +11,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Appends to a table of the file; returns the new element's index.
-std::size_t appended(OrderedJson& json, const char* table, OrderedJson element) {
-    OrderedJson& all = json[table];
-    all.push_back(std::move(element));
-    return all.size() - 1;
-}
-
-/// Puts an image into the BIN chunk; returns the index of its buffer view.
-std::size_t stored(OrderedJson& json, std::string& bin, const std::string& png) {
-    bin.resize((bin.size() + 3) / 4 * 4, '\0');
-    const std::size_t at = bin.size();
-    bin += png;
-    json["buffers"][0]["byteLength"] = bin.size();
-    return appended(json, "bufferViews", {{"buffer", 0}, {"byteOffset", at}, {"byteLength", png.size()}});
-}
-
 /// Primitives that name no material get this one.
 void give_material(OrderedJson& json, std::size_t material) {
     for (OrderedJson& mesh : json["meshes"])
