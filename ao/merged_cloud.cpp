@@ -231,7 +231,8 @@ std::optional<Estimate> estimate_at(const cv::Mat1f& visibility, const cv::Mat1f
 /// What a person decides about sides is not overruled; images know no sky.
 bool MergedCloudAo::looks_for_frames(const PointSet& cloud) const {
     return !options_.sky && options_.outside == "auto" && options_.normals == CloudNormals::automatic &&
-           cloud.triangles.empty() && cloud.seen_from.empty() && cloud.points.size() <= rays_.most_at_once();
+           cloud.triangles.empty() && cloud.splats.empty() && cloud.seen_from.empty() &&
+           cloud.points.size() <= rays_.most_at_once();
 }
 
 /// Those that the file names, else those that the order of the points tells; nothing where there are none.

@@ -116,25 +116,69 @@ Untouched<float> light_on(const CloudSurface& surface, const DiscRays& rays, con
     return values;
 }
 
-/// Turns sides to a place, where it sees them: splats are recorded from many sides, so the backs of things face away
-/// from any place. `known` is how sure sides are. Returns the share of splats that it sees.
-double turn_to_place(CloudSurface& surface, const DiscRays& rays, const Vector3f& place, std::vector<float>& known) {
+/// Whether the nearest cameras that have a splat in their images see its front, 1, or its back, -1; 0 if none sees it.
+class CameraVotes {
+  public:
+    CameraVotes(std::span<const FoundFrame> frames, const Vector3d& middle) {
+        for (const FoundFrame& frame : frames)
+            cameras_.push_back({(frame.world_from_camera.inverse() * Eigen::Translation3d(middle)).cast<float>(),
+                                (frame.world_from_camera.translation() - middle).cast<float>(), frame.camera});
+    }
+    [[nodiscard]] int operator()(const CloudSurface& surface, const DiscRays& rays, std::size_t splat) const {
+        constexpr std::size_t most = 12; // of them, the nearest: farther ones are rarely the first to see a thing
+        constexpr int enough = 5;        // more votes for one side than for the other
+        std::vector<std::pair<float, const PosedCamera*>> near;
+        for (const PosedCamera& camera : cameras_)
+            if (camera.shows(surface.tree[splat]))
+                near.emplace_back((surface.tree[splat] - camera.position).squaredNorm(), &camera);
+        const auto end = near.begin() + static_cast<std::ptrdiff_t>(std::min(most, near.size()));
+        std::partial_sort(near.begin(), end, near.end());
+        int votes = 0, asked = 0;
+        for (auto each = near.begin(); each != end && std::abs(votes) < enough; ++each, ++asked)
+            votes += rays.seen_from(splat, each->second->position);
+        // Some look through gaps at the backs of what none sees.
+        return 2 * std::abs(votes) < asked ? 0 : std::clamp(votes, -1, 1);
+    }
+
+  private:
+    struct PosedCamera {
+        Eigen::Isometry3f camera_from_tree;
+        Vector3f position;
+        Pinhole pinhole;
+
+        [[nodiscard]] bool shows(const Vector3f& point) const {
+            const Vector3d seen = (camera_from_tree * point).cast<double>();
+            if (!(seen.z() > 0))
+                return false;
+            const Eigen::Vector2d pixel = pinhole.pixel(seen);
+            return pixel.x() > -0.5 && pixel.y() > -0.5 && pixel.x() < pinhole.size.width - 0.5 &&
+                   pixel.y() < pinhole.size.height - 0.5;
+        }
+    };
+    std::vector<PosedCamera> cameras_;
+};
+
+/// Turns sides to where they are seen from: splats are recorded from many sides, so the backs of things face away from
+/// any place. `see(splat)` is 1 for its front, -1, or 0; `known` is how sure sides are. Returns the share of splats
+/// that are seen.
+template <class See>
+double turn_to_seen(CloudSurface& surface, const See& see, std::vector<float>& known) {
     std::vector<std::int8_t> seen(surface.size());
     tbb::parallel_for(std::size_t(0), seen.size(), [&](std::size_t i) {
-        seen[i] = static_cast<std::int8_t>(surface.normals[i].isZero() ? 0 : rays.seen_from(i, place));
+        seen[i] = static_cast<std::int8_t>(surface.normals[i].isZero() ? 0 : see(i));
     });
     const auto front = std::ranges::count(seen, 1), back = std::ranges::count(seen, -1);
     const float whole = back > front ? -1.0F : 1.0F; // what it does not see is wrong where all the rest is
     std::vector<float> turned(surface.size(), whole);
     tbb::parallel_for(std::size_t(0), turned.size(), [&](std::size_t i) {
-        constexpr float one_plane = 0.9F;  // cosine
-        float votes = seen[i], voters = 1; // a gap in what hides it may show one of many
+        constexpr float one_plane = 0.9F, fewest = 4; // cosine; splats that agree
+        float votes = seen[i], voters = 1;            // a gap in what hides it may show one of many
         for (const std::uint32_t j : surface.near[i])
             if (const float alike = surface.normals[i].dot(surface.normals[j]); j != i && std::abs(alike) > one_plane) {
                 votes += static_cast<float>(alike < 0 ? -seen[j] : seen[j]);
                 ++voters;
             }
-        if (std::abs(votes) <= 0.75F * voters)
+        if (std::abs(votes) <= 0.75F * voters || voters < fewest)
             return;
         turned[i] = votes < 0 ? -1.0F : 1.0F;
         known[i] = 1;
@@ -144,19 +188,34 @@ double turn_to_place(CloudSurface& surface, const DiscRays& rays, const Vector3f
     return static_cast<double>(front + back) / static_cast<double>(std::max<std::size_t>(surface.size(), 1));
 }
 
-/// Returns how sure they are, by index in the tree.
-std::vector<float> settle(SettledSides& sides, CloudSurface& surface, const DiscRays& soft) {
+/// Returns how sure they are, by index in the tree. `cameras` decide where there are some.
+std::vector<float> settle(SettledSides& sides, CloudSurface& surface, const DiscRays& soft,
+                          std::span<const FoundFrame> cameras) {
     using Kind = NormalOrientation::Kind;
     const NormalOrientation asked = sides.orientation;
-    const bool to_place = asked.kind == Kind::viewpoint;
-    if (to_place)
+    const bool to_place = asked.kind == Kind::viewpoint && cameras.empty();
+    if (to_place || !cameras.empty())
         sides.orientation = {};
     std::optional<DiscRays> rays;
     std::vector<float> known = sides.settle(surface, rays, false);
+    constexpr double much = 0.1; // of the splats: enough to choose between two answers of the whole
+    if (!cameras.empty()) {
+        const CameraVotes votes(cameras, surface.middle);
+        const double share = turn_to_seen(
+            surface, [&](std::size_t i) { return votes(surface, soft, i); }, known);
+        if (share > much)
+            sides.findings.clear();
+        sides.orientation.why = fmt::format("to the {} cameras that the splats were made with, which see {:.0f} % of "
+                                            "them; others {}",
+                                            cameras.size(), 100 * share, sides.orientation.why);
+        return known;
+    }
     if (!to_place)
         return known;
-    constexpr double much = 0.1; // of the splats: enough to choose between two answers of the whole
-    if (turn_to_place(surface, soft, (asked.point - surface.middle).cast<float>(), known) > much)
+    const Vector3f place = (asked.point - surface.middle).cast<float>();
+    const double share = turn_to_seen(
+        surface, [&](std::size_t i) { return soft.seen_from(i, place); }, known);
+    if (share > much)
         sides.findings.clear();
     sides.orientation = asked;
     sides.orientation.why += ", where it sees them";
@@ -229,7 +288,8 @@ void SplatWork::of_surface(const Indices& which) {
     sides.orientation = decided.decisions.orientation;
     std::vector<float> side_known;
     if (members.seen_from.empty())
-        side_known = settle(sides, surface, rays);
+        side_known =
+            settle(sides, surface, rays, options_.outside == "auto" ? cloud_.frames : std::span<const FoundFrame>());
     else
         sides.turn_to(surface, [&](std::size_t index) { return members.seen_from[surface.tree.original(index)]; });
     watch.lap("sides");

@@ -77,7 +77,7 @@ PointVisibility visibility_of_points(const Frame& frame, PointMethod& method) {
         set.stations = cloud.records->stations;
     std::vector<std::string> disbelief;
     const std::vector<FoundFrame> frames = recorded_frames(cloud, disbelief);
-    set.frames = frames;
+    set.frames = splats.empty() ? std::span(frames) : std::span(cloud.records->cameras);
     PointVisibility found = method.compute(set, scanner_of(frame));
     std::ranges::move(disbelief, std::back_inserter(found.notes));
     if (!splats.empty())

@@ -4,6 +4,7 @@
 #include "io/clouds/cloud_edit.h"
 #include "io/clouds/cloud_records.h"
 #include "io/clouds/format.h"
+#include "io/clouds/splat_cameras.h"
 #include "io/clouds/splats.h"
 #include "io/output_file.h"
 #include "io/text.h"
@@ -349,6 +350,8 @@ Cloud read_cloud(const fs::path& file, std::vector<std::string>& warnings) {
     PointOddities odd;
     cloud.points = points_of(*records, odd);
     warn_of(odd, file, warnings);
+    if (!records->splats.empty())
+        records->cameras = splat_cameras(file, warnings);
     records->colour_step = colour_step_of(*records);
     warn_of_colours(*records, file, warnings);
     cloud.colours = colours_of(*records);

@@ -4,6 +4,7 @@
 #include "io/clouds/laz/laz.h"
 #include "projection/base/splat.h"
 #include "projection/base/station.h"
+#include "projection/found_frames.h"
 
 #include <array>
 #include <cstdint>
@@ -70,6 +71,7 @@ struct CloudRecords {
     std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera, if the file has one
     std::vector<Station> stations;              ///< of a file of several scans, in the order of their points
     std::vector<Splat> splats;                  ///< one per point; empty where points are no Gaussian splats
+    std::vector<FoundFrame> cameras;            ///< of splats: those that they were made with, where they are known
 
     [[nodiscard]] bool text() const { return encoding == Encoding::ascii; }
     /// Point `index`'s bytes; for text what lies between the last word before it and its own last word.

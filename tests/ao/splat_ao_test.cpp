@@ -29,9 +29,11 @@ struct Scene {
         points.push_back(point);
         splats.push_back({turned.cast<float>(), sigmas, static_cast<float>(opacity)});
     }
-    [[nodiscard]] PointVisibility seen(double radius, const std::string& outside = "1,1,1") const {
+    [[nodiscard]] PointVisibility seen(double radius, const std::string& outside = "1,1,1",
+                                       std::span<const FoundFrame> cameras = {}) const {
         PointSet set{points};
         set.splats = splats;
+        set.frames = cameras;
         return CloudAo({.radius = radius, .outside = outside}).compute(set);
     }
 };
@@ -109,6 +111,37 @@ TEST(SplatAo, a_place_turns_the_sides_that_it_sees) {
     EXPECT_GT(tests::mean(found.visibility), 0.98);
     for (std::size_t i = 0; i < scene.points.size(); ++i)
         ASSERT_GT(found.normals[i].cast<double>().dot(scene.points[i] - centre), 0.9) << i;
+}
+
+FoundFrame camera_at(const Vector3d& position, const Vector3d& towards) {
+    FoundFrame frame{.camera = {300, 300, 319.5, 239.5, {640, 480}}};
+    const Vector3d z = (towards - position).normalized(), x = z.unitOrthogonal();
+    frame.world_from_camera.linear() << x, z.cross(x), z;
+    frame.world_from_camera.translation() = position;
+    return frame;
+}
+
+/// The same ball is a room to cameras within it, and an object to those around it.
+TEST(SplatAo, cameras_decide_what_is_inside_and_what_outside) {
+    Dice dice;
+    Scene scene;
+    for (const Vector3d& p : tests::sphere(3000, Vector3d::Zero()))
+        scene.add(p, p, 0.05, 0.9, dice);
+    for (const bool inside : {true, false}) {
+        std::vector<FoundFrame> cameras;
+        for (const Vector3d& way : tests::sphere(40, Vector3d::Zero()))
+            cameras.push_back(inside ? camera_at(-0.3 * way, way) : camera_at(4 * way, Vector3d::Zero()));
+        const PointVisibility found = scene.seen(1, "auto", cameras);
+        int right = 0;
+        for (std::size_t i = 0; i < scene.points.size(); ++i)
+            right += (found.normals[i].cast<double>().dot(scene.points[i]) < 0) == inside;
+        EXPECT_EQ(right, 3000) << inside;
+        EXPECT_TRUE(std::ranges::any_of(found.notes, [](const std::string& note) {
+            return note.find("to the 40 cameras that the splats were made with, which see 100 %") != std::string::npos;
+        })) << inside;
+    }
+    const PointVisibility given = scene.seen(1, "outward", {std::vector{camera_at({0, 0, 0}, {1, 0, 0})}});
+    EXPECT_GT(given.normals[0].cast<double>().dot(scene.points[0]), 0) << "what people say goes first";
 }
 
 /// A sheet at the height h over a floor lets T of the light through: V = 1 - (1 - T) (1 - (h / R)^2). Of n random
