@@ -186,6 +186,9 @@ void write_large(Work& work, const Outputs& outputs) {
     else if (outputs.cloud && outputs.colour_cloud == CloudColours::grey)
         work.row.warnings.push_back("the file's point format has no colour, so grey is not written; the field "
                                     "ambient_occlusion has the values.");
+    if (outputs.tiles3d)
+        work.row.warnings.push_back("tiles3d is not written of clouds that are computed from disk; a --cloud.memory that "
+                                    "holds the cloud gives tiles.");
     LargeCloudRun::Result result = work.large->result(work.large_file, target, colours, outputs.error);
     if (target)
         work.row.files.push_back(file);
