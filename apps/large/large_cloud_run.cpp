@@ -102,7 +102,7 @@ void LargeCloudRun::compute(PointMethod& method) {
 }
 
 LargeCloudRun::Result LargeCloudRun::result(std::size_t index, const std::optional<fs::path>& target,
-                                            const Colours& colours, bool with_errors) const {
+                                            const Colours& colours, bool with_errors, const Each& each) const {
     const CloudStream& stream = file(index);
     const std::size_t start = source_->start(index);
     ValuesInOrder values(*tiles_);
@@ -136,6 +136,8 @@ LargeCloudRun::Result LargeCloudRun::result(std::size_t index, const std::option
                 sum += static_cast<double>(value);
             }
         std::vector<cv::Vec3b> own = source_->coloured(index) ? colours_of(block) : std::vector<cv::Vec3b>();
+        if (each)
+            each(points, own, visibility, error);
         for (; next < shown.size() && shown[next].number < start + first + block.point_count; ++next) {
             const std::size_t i = shown[next].number - start - first;
             result.shown.points.push_back(points[i]);

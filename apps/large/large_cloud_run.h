@@ -57,10 +57,13 @@ class LargeCloudRun {
         double mean = 0; ///< visibility; NaN where none is known
         std::vector<std::string> warnings;
     };
-    /// Passes over the file once more. Writes it with values to `target`, where one is given, `with_errors`
-    /// or without ao_error.
+    /// Points, block by block, with their own colours (empty = none) and values.
+    using Each = std::function<void(const std::vector<Eigen::Vector3d>& points, const std::vector<cv::Vec3b>& own,
+                                    const std::vector<float>& visibility, const std::vector<float>& error)>;
+    /// Passes over the file once more; `each` gets all points. Writes it with values to `target`, where one is given,
+    /// `with_errors` or without ao_error.
     [[nodiscard]] Result result(std::size_t file, const std::optional<std::filesystem::path>& target,
-                                const Colours& colours, bool with_errors) const;
+                                const Colours& colours, bool with_errors, const Each& each = {}) const;
 
     /// The temporary files stay: another run goes on.
     void keep() { kept_ = true; }

@@ -77,7 +77,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
     if (work.large) {
         take(work, &StageTimes::write, [&] { write_large(work, outputs); });
         written_ms = work.row.ms.write;
-        outputs.cloud = false; // what follows shows a part of it
+        outputs.cloud = outputs.tiles3d = false; // what follows shows a part of it
     }
     take(work, &StageTimes::attach, [&] {
         images = attach_values(work, options, options.recording && !by_points ? with_messages(outputs) : outputs,

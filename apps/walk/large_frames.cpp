@@ -2,6 +2,7 @@
 
 #include "apps/frame/frame_points.h"
 #include "apps/large/survey.h"
+#include "apps/walk/cloud_tiles.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/format.h"
 #include "projection/base/error.h"
@@ -186,12 +187,19 @@ void write_large(Work& work, const Outputs& outputs) {
     else if (outputs.cloud && outputs.colour_cloud == CloudColours::grey)
         work.row.warnings.push_back("the file's point format has no colour, so grey is not written; the field "
                                     "ambient_occlusion has the values.");
-    if (outputs.tiles3d)
-        work.row.warnings.push_back("tiles3d is not written of clouds that are computed from disk; a --cloud.memory that "
-                                    "holds the cloud gives tiles.");
-    LargeCloudRun::Result result = work.large->result(work.large_file, target, colours, outputs.error);
+    std::optional<LargeCloudTiles> tiles;
+    LargeCloudRun::Each add_to_tiles;
+    if (outputs.tiles3d) {
+        tiles.emplace(work, outputs);
+        add_to_tiles = [&](const auto& points, const auto& own, const auto& visibility, const auto& error) {
+            tiles->add(points, own, visibility, error);
+        };
+    }
+    LargeCloudRun::Result result = work.large->result(work.large_file, target, colours, outputs.error, add_to_tiles);
     if (target)
         work.row.files.push_back(file);
+    if (tiles)
+        tiles->finish();
     std::ranges::move(result.warnings, std::back_inserter(work.row.warnings));
     work.of_points = std::move(result.of_shown);
     work.frame.name = work.entry.name;

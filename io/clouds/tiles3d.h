@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <Eigen/Geometry>
 #include <filesystem>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <span>
@@ -42,5 +43,25 @@ struct TilesWritten {
 /// floats about the middle of each tile. Throws Error where no point has coordinates, OutOfMemory, and Outage.
 TilesWritten write_tiles3d(const std::filesystem::path& folder, const TilesetScene& scene,
                            const TilesetOptions& options = {});
+
+/// The same for a cloud larger than the memory: its points go through files beside the tiles, which take up to 40 bytes
+/// each. The tiles are byte for byte those of write_tiles3d().
+class LargeTileset {
+  public:
+    /// As many points as `at_once` are in memory, 80 bytes each.
+    LargeTileset(std::filesystem::path folder, TilesetOptions options, std::size_t at_once = 1 << 22);
+    ~LargeTileset(); ///< removes what is not finished
+    LargeTileset(const LargeTileset&) = delete;
+    LargeTileset& operator=(const LargeTileset&) = delete;
+
+    /// The next points. Fields are those of the first call. Throws Outage naming the file.
+    void add(const TilesetScene& some);
+    /// Once. Throws as write_tiles3d().
+    TilesWritten finish(const std::optional<Eigen::Isometry3d>& earth_from_tiles);
+
+  private:
+    struct Parts;
+    std::unique_ptr<Parts> parts_;
+};
 
 } // namespace scanshade

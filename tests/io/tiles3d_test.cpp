@@ -78,6 +78,39 @@ TEST(Tiles3d, of_many_are_in_several_documents) {
     EXPECT_EQ(written.files.size(), written.tiles + back.documents);
 }
 
+TEST(Tiles3d, of_a_cloud_larger_than_the_memory_have_the_bytes_of_others) {
+    const TemporaryFolder folder;
+    const std::vector<Vector3d> points = hills(20000);
+    std::vector<float> numbers(points.size());
+    std::iota(numbers.begin(), numbers.end(), 0.0F);
+    const std::vector<cv::Vec3b> colours(points.size(), cv::Vec3b(0, 128, 255));
+    const TilesetOptions options{.most_points = 300};
+    const TilesWritten whole =
+        write_tiles3d(folder / "a", {.points = points, .colours = colours, .fields = {{"_NUMBER", numbers}}}, options);
+    for (const std::size_t at_once : {1500U, 300U}) {
+        LargeTileset large(folder / "b", options, at_once);
+        for (std::size_t first = 0; first < points.size(); first += 700) {
+            const std::size_t count = std::min<std::size_t>(700, points.size() - first);
+            large.add({.points = std::span(points).subspan(first, count),
+                       .colours = std::span(colours).subspan(first, count),
+                       .fields = {{"_NUMBER", std::span(numbers).subspan(first, count)}}});
+        }
+        const TilesWritten parts = large.finish({});
+        EXPECT_EQ(parts.files, whole.files);
+        EXPECT_EQ(parts.levels, whole.levels);
+        for (const auto& file : whole.files)
+            ASSERT_EQ(tests::file_bytes(folder / "b" / file), tests::file_bytes(folder / "a" / file)) << file;
+        const auto entries = std::distance(std::filesystem::directory_iterator(folder / "b"), {});
+        EXPECT_EQ(static_cast<std::size_t>(entries), whole.files.size()) << "nothing temporary stays";
+    }
+    {
+        LargeTileset left(folder / "c", options);
+        left.add({.points = points, .colours = colours});
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder / ".c.part")) << "unfinished";
+    EXPECT_THROW(LargeTileset(folder / "d", options).finish({}), Error);
+}
+
 TEST(Tiles3d, of_few_points_or_of_one_place_end) {
     const TemporaryFolder folder;
     TilesWritten written;
