@@ -3,6 +3,7 @@
 #include "io/clouds/splats.h"
 #include "projection/srgb.h"
 #include "tests/support/glb_file.h"
+#include "tests/support/splat_glb.h"
 
 #include <cmath>
 #include <limits>
@@ -14,71 +15,6 @@ using nlohmann::json;
 using namespace tests;
 namespace fs = std::filesystem;
 using Eigen::Vector3d, Eigen::Vector3f;
-
-const std::string prefix = "KHR_gaussian_splatting:";
-
-/// Two splats in each of two primitives, each shown by a node of its own. `change` is made to the JSON.
-struct SplatGlb {
-    bool logarithms = false;
-    std::function<void(json&)> change = [](json&) {};
-
-    [[nodiscard]] std::string bytes() const {
-        std::string bin;
-        json gltf = json::parse(R"({"asset": {"version": "2.0"}, "extensionsUsed": ["KHR_gaussian_splatting"],
-            "scenes": [{"nodes": [0, 1]}], "extras": {"keep": "this"},
-            "nodes": [{"mesh": 0}, {"mesh": 1, "translation": [10, 0, 0], "rotation": [0, 0, 1, 0], "scale": [2, 2, 2]}]})");
-        const auto add = [&](int type, const char* shape, const std::string& values, std::size_t count) {
-            gltf["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", bin.size()}, {"byteLength", values.size()}});
-            gltf["accessors"].push_back({{"bufferView", gltf["bufferViews"].size() - 1},
-                                         {"componentType", type},
-                                         {"count", count},
-                                         {"type", shape}});
-            bin += values;
-            return gltf["accessors"].size() - 1;
-        };
-        const auto floats = [&](const char* shape, const std::vector<float>& values) {
-            return add(5126, shape, std::string(reinterpret_cast<const char*>(values.data()), 4 * values.size()), 2);
-        };
-        for (int mesh = 0; mesh < 2; ++mesh) {
-            std::vector<float> sigma{0.5F, 0.25F, 0.01F, 0.5F, 0.25F, 0.01F};
-            for (float& value : sigma)
-                value = logarithms ? std::log(value) : value;
-            json attributes;
-            attributes["POSITION"] = floats("VEC3", {1, 2, 3, 1.5, 2, 3});
-            gltf["accessors"].back()["min"] = {1, 2, 3};
-            gltf["accessors"].back()["max"] = {1.5, 2, 3};
-            attributes[prefix + "ROTATION"] = floats("VEC4", {0, 0, 0, 1, 2, 0, 0, 2}); // the second a quarter about x
-            attributes[prefix + "SCALE"] = floats("VEC3", sigma);
-            attributes[prefix + "OPACITY"] = add(5121, "SCALAR", "\xff\x33", 2);
-            gltf["accessors"].back()["normalized"] = true;
-            bin.resize(bin.size() + 2, '\0');
-            attributes[prefix + "SH_DEGREE_0_COEF_0"] = floats("VEC3", {1, 0, -1, 0.5, 0.5, 0.5});
-            for (int k = 0; k < 3; ++k)
-                attributes[prefix + "SH_DEGREE_1_COEF_" + std::to_string(k)] =
-                    floats("VEC3", {0.1F, 0.2F, 0.3F, 1, 1, 1});
-            attributes["COLOR_0"] = add(5121, "VEC4", "\x80\x80\x80\xff\x80\x80\x80\x33", 2);
-            gltf["accessors"].back()["normalized"] = true;
-            gltf["meshes"].push_back(
-                {{"primitives",
-                  {{{"attributes", attributes},
-                    {"mode", 0},
-                    {"extensions",
-                     {{"KHR_gaussian_splatting", {{"kernel", "ellipse"}, {"colorSpace", "srgb_rec709_display"}}}}}}}}});
-        }
-        gltf["buffers"] = json::array({{{"byteLength", bin.size()}}});
-        change(gltf);
-        std::string text = gltf.dump(), all = "glTF";
-        text.resize((text.size() + 3) / 4 * 4, ' ');
-        const auto put = [&](std::size_t value) {
-            const auto word = static_cast<std::uint32_t>(value);
-            all.append(reinterpret_cast<const char*>(&word), 4);
-        };
-        put(2), put(28 + text.size() + bin.size()), put(text.size());
-        all += "JSON" + text;
-        put(bin.size());
-        return all + std::string("BIN\0", 4) + bin;
-    }
-};
 
 Cloud read(const TemporaryFolder& folder, const SplatGlb& file, std::vector<std::string>& warnings) {
     return read_cloud(write_file(folder / "a.glb", file.bytes()), warnings);
@@ -165,9 +101,9 @@ TEST(SplatGlb, is_shaded_in_all_its_coefficients) {
                             std::vector<float>{0.5F, std::numeric_limits<float>::quiet_NaN(), 1, 1}, 1);
         const Gltf before = gltf_in(folder / "a.glb"), after = gltf_in(folder / "b.glb");
         EXPECT_EQ(after.text, before.text);
-        const auto old = before.attribute<float>(prefix + "SH_DEGREE_0_COEF_0"),
-                   dc = after.attribute<float>(prefix + "SH_DEGREE_0_COEF_0"),
-                   rest = after.attribute<float>(prefix + "SH_DEGREE_1_COEF_2");
+        const auto old = before.attribute<float>(splat_prefix + "SH_DEGREE_0_COEF_0"),
+                   dc = after.attribute<float>(splat_prefix + "SH_DEGREE_0_COEF_0"),
+                   rest = after.attribute<float>(splat_prefix + "SH_DEGREE_1_COEF_2");
         const auto fallback = after.attribute<std::uint8_t>("COLOR_0");
         for (const std::size_t k : {0U, 1U, 2U}) {
             const double colour = 0.5 + colour_of_degree_0 * static_cast<double>(old[k]);
@@ -216,13 +152,13 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"the colour space \"lin_p3\" are not read",
                 [](json& gltf) { extension(gltf)["colorSpace"] = "lin_p3"; }},
         Refused{"mesh 1: primitive 0: KHR_gaussian_splatting:SCALE: is missing",
-                [](json& gltf) { attributes(gltf).erase(prefix + "SCALE"); }},
+                [](json& gltf) { attributes(gltf).erase(splat_prefix + "SCALE"); }},
         Refused{"KHR_gaussian_splatting:OPACITY: 1 element for 2 splats",
                 [](json& gltf) {
-                    gltf["accessors"][attributes(gltf)[prefix + "OPACITY"].get<std::size_t>()]["count"] = 1;
+                    gltf["accessors"][attributes(gltf)[splat_prefix + "OPACITY"].get<std::size_t>()]["count"] = 1;
                 }},
         Refused{"KHR_gaussian_splatting:ROTATION: elements of 3 numbers, expected 4",
-                [](json& gltf) { attributes(gltf)[prefix + "ROTATION"] = attributes(gltf)["POSITION"]; }},
+                [](json& gltf) { attributes(gltf)[splat_prefix + "ROTATION"] = attributes(gltf)["POSITION"]; }},
         Refused{"mesh 0 of splats is shown by several nodes", [](json& gltf) { gltf["nodes"][1]["mesh"] = 0; }},
         Refused{"splats have the mode 0", [](json& gltf) { gltf["meshes"][1]["primitives"][0]["mode"] = 4; }}));
 

@@ -4,6 +4,7 @@
 #include "tests/support/files.h"
 #include "tests/support/points.h"
 #include "tests/support/small_capture.h"
+#include "tests/support/splat_glb.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -181,6 +182,30 @@ TEST_F(ReadersTest, the_validator_finds_no_fault_with_tiles) {
             ++tiles;
         }
     EXPECT_GT(tiles, 4);
+}
+
+/// The validator knows neither the extension nor names of attributes with a colon; the input has as many of these.
+TEST_F(ReadersTest, the_validator_finds_no_more_in_shaded_splats_than_in_theirs) {
+    const fs::path file = tests::write_file(folder / "a.glb", tests::SplatGlb().bytes());
+    const auto messages = [&](const fs::path& of) {
+        std::vector<std::string> all;
+        for (const json& each : report_of(of)["issues"]["messages"])
+            all.push_back(fmt::format("{} {}", each["code"].get<std::string>(), each["pointer"].get<std::string>()));
+        return all;
+    };
+    const std::vector<std::string> before = messages(file);
+    for (const std::string& each : before)
+        EXPECT_TRUE(each.starts_with("UNSUPPORTED_EXTENSION /extensionsUsed/0") ||
+                    (each.starts_with("MESH_PRIMITIVE_INVALID_ATTRIBUTE") &&
+                     each.find("KHR_gaussian_splatting:") != std::string::npos))
+            << each;
+    std::vector<std::string> warnings;
+    const Cloud cloud = read_cloud(file, warnings);
+    const std::vector<float> values(cloud.points.size(), 0.5F);
+    write_cloud(folder / "b.glb", cloud, {{"ambient_occlusion", values}});
+    write_shaded_splats(folder / "c.glb", cloud, values, 1);
+    EXPECT_EQ(messages(folder / "b.glb"), before);
+    EXPECT_EQ(messages(folder / "c.glb"), before);
 }
 
 TEST_F(ReadersTest, a_mesh_is_triangles_and_the_cloud_of_a_recording_is_points) {
