@@ -4,6 +4,7 @@
 #include "io/files.h"
 #include "io/output_file.h"
 #include "io/text.h"
+#include "io/utf16.h"
 #include "projection/base/error.h"
 
 #include <algorithm>
@@ -54,8 +55,9 @@ char first_in(const CameraText& text) {
     return first == std::string::npos ? '\0' : text.bytes[first];
 }
 /// A bracket may begin a printed matrix, too.
-bool is_json(const CameraText& text) {
-    return first_in(text) == '{' || (first_in(text) == '[' && lower_extension(text.file) == ".json");
+bool is_json(const CameraText& text) { // Python prints dictionaries with other quotes
+    const bool python = text.bytes.find('"') == std::string::npos && text.bytes.find('\'') != std::string::npos;
+    return (first_in(text) == '{' && !python) || (first_in(text) == '[' && lower_extension(text.file) == ".json");
 }
 bool is_xml(const CameraText& text) { return first_in(text) == '<'; }
 bool has_keys(const CameraText& text) { return has_camera_keys(text.lines); }
@@ -204,7 +206,9 @@ CameraFile read_camera_file(const fs::path& file) {
     const std::string bytes = read_at_most(largest_file, file, "a camera file");
     if (trimmed(bytes).empty())
         refuse_camera(file, "empty file, expected a camera");
-    CameraFile result = read_any(file, bytes);
+    if (bytes.starts_with("\x93NUMPY"))
+        refuse_camera(file, "a NumPy array, expected text: numpy.savetxt writes it");
+    CameraFile result = read_any(file, plain_text(bytes));
     result.camera.origin = file.string();
     if (result.colour)
         result.colour->camera.origin = file.string();

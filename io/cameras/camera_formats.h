@@ -27,6 +27,13 @@ void check_numbers(const std::filesystem::path& file, const Pinhole& camera, con
 [[nodiscard]] CameraFile camera_from_json(const std::filesystem::path& file, const std::string& text);
 /// Of an object as camera_from_json() reads it, where sizes may be missing.
 [[nodiscard]] CameraFile camera_from_keys(const std::filesystem::path& file, const nlohmann::json& object);
+/// The one camera in a JSON of others, by our names of its keys, with the numbers that stand around it. Of several,
+/// that of depth, with a warning. Throws Error naming the file where there is none, or where none says that it is
+/// depth's.
+[[nodiscard]] nlohmann::json in_our_words(const std::filesystem::path& file, const nlohmann::json& root,
+                                          std::vector<std::string>& warnings);
+/// What other keys of a camera's object say: takes the unit of depths, and names the numbers that nothing reads.
+void use_other_keys(const std::filesystem::path& file, const nlohmann::json& object, CameraFile& result);
 /// Lines of a key and a number, whatever stands between them: fx, fy, cx or ppx ..., as ORB-SLAM's settings have them
 /// behind "Camera.", and RealSense Viewer's tables with other words. Of several sections of an INI file none is chosen.
 [[nodiscard]] CameraFile camera_from_lines(const std::filesystem::path& file, const std::vector<TextLine>& lines);

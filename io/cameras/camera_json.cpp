@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 namespace scanshade {
 
@@ -131,11 +133,12 @@ Pinhole from_keys(const fs::path& file, const Json& object) {
     return camera;
 }
 
+constexpr std::array model_keys{"camera_model", "distortion_model", "model"};
+
 /// Whether the file names a lens model of four radial coefficients.
 bool names_fisheye(const Json& object) {
-    constexpr std::array keys{"camera_model", "distortion_model", "model"};
     constexpr std::array names{"fisheye", "FISHEYE", "equidistant", "EQUIDISTANT", "kannala", "KANNALA"};
-    return std::ranges::any_of(keys, [&](const char* key) {
+    return std::ranges::any_of(model_keys, [&](const char* key) {
         const std::string model = object.contains(key) ? object[key].dump() : "";
         return std::ranges::any_of(names, [&](const char* name) { return model.find(name) != std::string::npos; });
     });
@@ -162,21 +165,43 @@ Distortion lens_of(const fs::path& file, const Json& object) {
                       fmt::format("\"{}\" and \"{}\" are both there, one lens expected", found.front(), found.back()));
     const std::string& key = found.front();
     const bool fisheye = key == "fisheye" || names_fisheye(object);
-    if (std::ranges::count(lists, key) > 0) {
-        const Json& list = object[key];
+    const Json& list = object[key];
+    const bool is_list = std::ranges::count(lists, key) > 0;
+    if (is_list && !list.is_object()) {
         if (fisheye)
             return kannala_brandt(numbers_of(file, object, key, 4));
-        const bool short_or_rational = list.is_array() && (list.size() == 4 || list.size() == 8); // else 5 are expected
-        return brown_conrady(numbers_of(file, object, key, short_or_rational ? list.size() : 5));
+        constexpr std::array usual{4U, 8U, 12U, 14U}; // else 5 are expected
+        auto k =
+            numbers_of(file, object, key, list.is_array() && std::ranges::count(usual, list.size()) ? list.size() : 5);
+        for (; k.size() > 8; k.pop_back())
+            if (k.back() != 0)
+                refuse_camera(file,
+                              fmt::format("\"{}\" number {} is {}: thin-prism and tilted lenses are not supported", key,
+                                          k.size(), k.back()));
+        return brown_conrady(k);
     }
+    const Json& named = is_list ? list : object;
     const auto number = [&](const char* name) {
-        return object.contains(name) ? number_of(file, object[name], name) : 0.0;
+        return named.contains(name) ? number_of(file, named[name], name) : 0.0;
     };
     if (fisheye)
         return kannala_brandt({number("k1"), number("k2"), number("k3"), number("k4")});
     std::vector<double> coefficients;
     std::ranges::transform(numbers, std::back_inserter(coefficients), number);
     return brown_conrady(coefficients);
+}
+
+/// librealsense's inverse model undistorts by what others distort with.
+void refuse_inverse_lens(const fs::path& file, const Json& object, const Distortion& lens) {
+    for (const char* key : model_keys) {
+        std::string model = object.contains(key) ? object[key].dump() : "";
+        std::ranges::transform(model, model.begin(),
+                               [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+        if (lens.any() && model.find("inverse") != std::string::npos)
+            refuse_camera(file, fmt::format("\"{}\" is {}: lenses given by their inverse are not read; give a camera "
+                                            "without one, or `scanshade refine` the capture",
+                                            key, object[key].dump()));
+    }
 }
 
 /// A matrix row by row, as lists of lists, as nine numbers, or as OpenCV's "data".
@@ -200,8 +225,18 @@ Pinhole from_rows(const fs::path& file, const Json& matrix) {
             std::ranges::for_each(row, add);
         else
             add(row);
+    if (m.size() == 4 && !matrix[0].is_array()) {
+        const Pinhole camera{m[0], m[1], m[2], m[3], {}};
+        check_numbers(file, camera, {"fx", "fy", "cx", "cy"});
+        return camera;
+    }
+    if (m.size() == 9 && m[2] == 0 && m[5] == 0 && (m[6] != 0 || m[7] != 0)) { // column by column, as of ARKit
+        std::swap(m[2], m[6]);
+        std::swap(m[5], m[7]);
+        std::swap(m[1], m[3]);
+    }
     if (m.size() != 9 || m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1)
-        refuse_camera(file, "no camera matrix row by row: expected fx 0 cx, 0 fy cy, 0 0 1");
+        refuse_camera(file, "no camera matrix: expected fx 0 cx, 0 fy cy, 0 0 1 row by row, or fx fy cx cy");
     const Pinhole camera{m[0], m[4], m[2], m[5], {}};
     check_numbers(file, camera, {"fx", "fy", "cx", "cy"});
     return camera;
@@ -220,6 +255,7 @@ Camera one_camera(const fs::path& file, const Json& object, Sizes sizes = Sizes:
     if ((sizes == Sizes::needed && !matrix) || object.contains(width) || object.contains(height))
         camera.pinhole.size = {size_of(file, object, width), size_of(file, object, height)};
     camera.distortion = lens_of(file, object);
+    refuse_inverse_lens(file, object, camera.distortion);
     return camera;
 }
 
@@ -265,22 +301,63 @@ void take_depth_scale(const fs::path& file, const Json& object, CameraFile& resu
     }
 }
 
-/// Names the numbers in the file that nothing reads: one of them may be what makes the depths wrong.
-void name_unused(const fs::path& file, const Json& object, CameraFile& result) {
-    constexpr std::array others{
-        "intrinsic_matrix",  "fx", "fy", "cx", "cy", "ppx", "ppy", "width", "height", "w", "h", "depth_units_per_metre",
-        "pose_time_offset_s"};
+/// What standards write beside a camera and what has no part in it: ROS's rectification, calibrations' own records.
+constexpr std::array harmless{
+    "R",         "P",   "r",      "p",         "rectification_matrix", "projection_matrix", "binning_x",
+    "binning_y", "roi", "header", "refinement"};
+
+bool is_numeric(const Json& value) {
+    return value.is_number() || (value.is_array() && !value.empty() && value[0].is_number());
+}
+
+/// The keys below `object` whose numbers nothing reads, with those of nested objects behind a point.
+void collect_unused(const Json& object, const std::string& path, std::vector<std::string>& unused) {
+    constexpr std::array others{"intrinsic_matrix",
+                                "fx",
+                                "fy",
+                                "cx",
+                                "cy",
+                                "ppx",
+                                "ppy",
+                                "width",
+                                "height",
+                                "w",
+                                "h",
+                                "depth_units_per_metre",
+                                "pose_time_offset_s",
+                                "image_width",
+                                "image_height",
+                                "image_Width",
+                                "image_Height",
+                                "fisheye_model",
+                                "colour",
+                                "depth_correction"};
     const auto used = [&](const std::string& key) {
         return std::ranges::count(others, key) + std::ranges::count(matrices, key) + std::ranges::count(lists, key) +
-                   std::ranges::count(numbers, key) + std::ranges::count(depth_scales, key) >
+                   std::ranges::count(numbers, key) + std::ranges::count(depth_scales, key) +
+                   std::ranges::count(harmless, key) >
                0;
     };
+    for (const auto& [key, value] : object.items()) {
+        if (path.empty() && used(key))
+            continue;
+        if (is_numeric(value))
+            unused.push_back(in_quotes(path + key));
+        else if (value.is_object())
+            collect_unused(value, path + key + ".", unused);
+    }
+}
+
+/// Names the numbers in the file that nothing reads: one of them may be what makes the depths wrong.
+void name_unused(const fs::path& file, const Json& object, CameraFile& result) {
+    constexpr std::size_t most = 12;
     std::vector<std::string> unused;
-    for (const auto& [key, value] : object.items())
-        if ((value.is_number() || (value.is_array() && !value.empty() && value[0].is_number())) && !used(key))
-            unused.push_back(in_quotes(key));
+    collect_unused(object, "", unused);
+    const std::size_t all = unused.size();
+    unused.resize(std::min(all, most));
     if (!unused.empty())
-        result.warnings.push_back(fmt::format("{}: not used: {}.", file.string(), fmt::join(unused, ", ")));
+        result.warnings.push_back(fmt::format("{}: not used: {}{}.", file.string(), fmt::join(unused, ", "),
+                                              all > most ? fmt::format(" and {} more", all - most) : ""));
 }
 
 /// The secondary camera, which took the colour images.
@@ -304,12 +381,15 @@ ColourCamera secondary_camera(const fs::path& file, const Json& object) {
 } // namespace
 
 CameraFile camera_from_json(const fs::path& file, const std::string& text) {
-    const Json object = parse(file, text);
-    if (!object.is_object())
+    const Json root = parse(file, text);
+    const bool four = root.is_array() && root.size() == 4 && is_numeric(root);
+    const bool matrix = root.is_array() && (root.size() == 9 || root.size() == 3) && is_numeric(root[0]);
+    if (!root.is_object() && !four && !matrix && (!root.is_array() || root.empty() || !root[0].is_object()))
         refuse_camera(file, "expected a JSON object that describes a camera");
-    if (!object.contains("intrinsic_matrix") && !object.contains("fx") && !matrix_in(object))
-        refuse_camera(file, "\"intrinsic_matrix\" (Open3D's layout) and \"fx\" (ours) are both missing");
+    std::vector<std::string> warnings;
+    const Json object = in_our_words(file, four || matrix ? Json{{"K", root}} : root, warnings);
     CameraFile result;
+    result.warnings = std::move(warnings);
     result.camera = one_camera(file, object);
     if (object.contains("depth_units_per_metre")) {
         const double units = number_of(file, object["depth_units_per_metre"], "depth_units_per_metre");
@@ -317,8 +397,7 @@ CameraFile camera_from_json(const fs::path& file, const std::string& text) {
             refuse_camera(file, fmt::format("\"depth_units_per_metre\" is {}, expected a positive number", units));
         result.depth_units_per_metre = units;
     }
-    take_depth_scale(file, object, result);
-    name_unused(file, object, result);
+    use_other_keys(file, object, result);
     if (object.contains("registered")) {
         if (!object["registered"].is_boolean())
             refuse_camera(file, "\"registered\" is not true or false");
@@ -336,9 +415,13 @@ CameraFile camera_from_json(const fs::path& file, const std::string& text) {
 CameraFile camera_from_keys(const fs::path& file, const Json& object) {
     CameraFile result;
     result.camera = one_camera(file, object, Sizes::optional);
+    use_other_keys(file, object, result);
+    return result;
+}
+
+void use_other_keys(const fs::path& file, const Json& object, CameraFile& result) {
     take_depth_scale(file, object, result);
     name_unused(file, object, result);
-    return result;
 }
 
 namespace {

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <initializer_list>
+#include <nlohmann/json.hpp>
 #include <yaml-cpp/yaml.h>
 
 namespace scanshade {
@@ -24,6 +25,38 @@ YAML::Node parsed(const fs::path& file, const std::string& text) {
     } catch (const YAML::Exception& failure) {
         throw Error(fmt::format("{}: not YAML: {}", at_line(file, failure.mark.line + 1), failure.msg));
     }
+}
+
+/// The same as JSON. Refuses what aliases make endless.
+nlohmann::json as_json(const fs::path& file, const YAML::Node& node, std::size_t& left, int depth = 0) {
+    constexpr int deepest = 16;
+    if (left-- == 0 || depth > deepest)
+        refuse_camera(file, "nested too deep, or too many values for a camera");
+    if (node.IsScalar()) {
+        const auto value = number(node.Scalar());
+        return value && std::isfinite(*value) ? nlohmann::json(*value) : nlohmann::json(as_utf8(node.Scalar()));
+    }
+    nlohmann::json json = node.IsMap() ? nlohmann::json::object() : nlohmann::json::array();
+    for (const auto& entry : node)
+        if (node.IsMap() && entry.first.IsScalar())
+            json[as_utf8(entry.first.Scalar())] = as_json(file, entry.second, left, depth + 1);
+        else if (node.IsSequence())
+            json.push_back(as_json(file, entry, left, depth + 1));
+    return json;
+}
+nlohmann::json as_json(const fs::path& file, const YAML::Node& node) {
+    std::size_t most_values = 100000;
+    return as_json(file, node, most_values);
+}
+
+/// The numbers that stand in a map itself: what else it says than a camera.
+nlohmann::json numbers_in(const YAML::Node& node) {
+    nlohmann::json found = nlohmann::json::object();
+    for (const auto& entry : node)
+        if (entry.first.IsScalar() && entry.second.IsScalar())
+            if (const auto value = number(entry.second.Scalar()); value && std::isfinite(*value))
+                found[as_utf8(entry.first.Scalar())] = *value;
+    return found;
 }
 
 /// The key's plain value; "" where there is none.
@@ -44,11 +77,11 @@ std::string first_of(const YAML::Node& root, std::initializer_list<const char*> 
 
 /// OpenCV's samples and programs after them name the same things in several ways.
 std::string matrix_key(const YAML::Node& root) {
-    return first_of(root, {"camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "K", "M1"});
+    return first_of(root, {"camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "K", "k", "M1"});
 }
 std::string lens_key(const YAML::Node& root) {
     return first_of(root, {"distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "DistCoeffs",
-                           "dist_coeffs", "distortion_coeffs", "D", "D1"});
+                           "dist_coeffs", "distortion_coeffs", "D", "d", "D1"});
 }
 
 /// Numbers of a list, or of a matrix given as rows, cols, data.
@@ -208,13 +241,26 @@ CameraFile camera_from_yaml(const fs::path& file, const std::string& text) {
     if (!root.IsMap())
         refuse_camera(file, "not a map of keys and values");
     try {
-        if (root[matrix_key(root)].IsDefined())
-            return from_matrices(file, root);
-        if (root["cam0"].IsDefined())
-            return from_camchain(file, root);
+        if (root[matrix_key(root)].IsDefined()) {
+            CameraFile result = from_matrices(file, root);
+            use_other_keys(file, numbers_in(root), result);
+            return result;
+        }
+        if (root["cam0"].IsDefined()) {
+            CameraFile result = from_camchain(file, root);
+            use_other_keys(file, numbers_in(root["cam0"]), result);
+            return result;
+        }
         if (root["intrinsics"].IsDefined() && root["resolution"].IsDefined()) { // EuRoC's sensor.yaml: one of a chain
             CameraFile result;
             result.camera = of_chain(file, root);
+            use_other_keys(file, numbers_in(root), result);
+            return result;
+        }
+        std::vector<std::string> warnings;
+        if (const nlohmann::json object = as_json(file, root); object.dump().find("\"fx\"") != std::string::npos) {
+            CameraFile result = camera_from_keys(file, in_our_words(file, object, warnings));
+            result.warnings.insert(result.warnings.begin(), warnings.begin(), warnings.end());
             return result;
         }
     } catch (const YAML::Exception& failure) { // a node of the wrong kind

@@ -109,12 +109,103 @@ INSTANTIATE_TEST_SUITE_P(
         OthersCamera{"scannet.txt", "140 0 79.5 0\n0 141 59.5 0\n0 0 1 0\n0 0 0 1\n"},
         OthersCamera{"one_line.txt", "140, 0, 79.5, 0, 141, 59.5, 0, 0, 1"},
         OthersCamera{"printed.txt", "[[140.    0.   79.5]\n [  0.  141.   59.5]\n [  0.    0.    1. ]]\n"},
-        OthersCamera{"four.txt", "140 141 79.5 59.5\n"}),
+        OthersCamera{"four.txt", "140 141 79.5 59.5\n"},
+        OthersCamera{"columns.json",
+                     R"({"intrinsics": [[140,0,0],[0,141,0],[79.5,59.5,1]], "imageResolution": [160,120]})", known},
+        OthersCamera{"columns.txt", "140 0 0\n0 141 0\n79.5 59.5 1\n"},
+        OthersCamera{"decimal_commas.txt", "140,0 0,0 79,5\n0,0 141,0 59,5\n0,0 0,0 1,0\n"},
+        OthersCamera{"assigned.txt", "K = [140 0 79.5\n 0 141 59.5\n 0 0 1]\n"},
+        OthersCamera{"numpy_repr.txt", "array([[140., 0., 79.5],\n       [0., 141., 59.5],\n       [0., 0., 1.]])\n"},
+        OthersCamera{"size_first.txt", "160 120\n140 141 79.5 59.5\n", known},
+        OthersCamera{"size_last.txt", "140 141 79.5 59.5 160 120\n", known},
+        OthersCamera{"dictionary.txt", "{'fx': 140.0, 'fy': 141.0, 'cx': 79.5, 'cy': 59.5}\n"},
+        OthersCamera{"one_line_keys.txt", "fx=140, fy=141, cx=79.5, cy=59.5\n"},
+        OthersCamera{"table.csv", "fx,fy,cx,cy,width,height\n140,141,79.5,59.5,160,120\n", known},
+        OthersCamera{"librealsense.txt", "[ 160x120  p[79.5 59.5]  f[140 141]  Brown Conrady [0.1 0 0 0 0] ]\n", known,
+                     0.1},
+        OthersCamera{"enumerated.txt",
+                     "  Width:  160\n  Height: 120\n  PPX:  79.5\n  PPY:  59.5\n  Fx:  140\n  Fy:  141\n"
+                     "  Distortion:  Brown Conrady\n  Coeffs:  0.1  0  0  0  0\n",
+                     known, 0.1},
+        OthersCamera{"ros2.yaml",
+                     "height: 120\nwidth: 160\ndistortion_model: plumb_bob\nd:\n- 0.1\n- 0.0\n- 0.0\n- 0.0\n- 0.0\n"
+                     "k: [140.0, 0.0, 79.5, 0.0, 141.0, 59.5, 0.0, 0.0, 1.0]\nr: [1.0, 0.0]\nbinning_x: 0\n",
+                     known, 0.1},
+        OthersCamera{
+            "ros2.json",
+            R"({"width": 160, "height": 120, "d": [0.1,0,0,0,0], "k": [140,0,79.5,0,141,59.5,0,0,1], "binning_x": 0})",
+            known, 0.1},
+        OthersCamera{"opencv_unit.yml",
+                     "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
+                     "   data: [ 140., 0., 79.5, 0., 141., 59.5, 0., 0., 1. ]\ndepth_scale: 0.00025\n",
+                     {},
+                     0,
+                     4000,
+                     "metres per unit"},
+        OthersCamera{"opencv_unused.yml",
+                     "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
+                     "   data: [ 140., 0., 79.5, 0., 141., 59.5, 0., 0., 1. ]\nunit: 0.00025\n",
+                     {},
+                     0,
+                     0,
+                     "not used: \"unit\""},
+        OthersCamera{"camchain.yaml",
+                     "cam0:\n  camera_model: pinhole\n  intrinsics: [140, 141, 79.5, 59.5]\n  resolution: [160, 120]\n"
+                     "  depth_factor: 5000\n",
+                     known, 0, 5000, "units per metre"},
+        OthersCamera{"open3d_parameters.json",
+                     R"({"class_name": "PinholeCameraParameters", "extrinsic": [1,0], "intrinsic":
+            {"height": 120, "width": 160, "intrinsic_matrix": [140,0,0,0,141,0,79.5,59.5,1]}})",
+                     known, 0, 0, "the camera in \"intrinsic\" is used"},
+        OthersCamera{
+            "open3d_trajectory.json",
+            R"({"parameters": [{"intrinsic": {"height": 120, "width": 160, "intrinsic_matrix": [140,0,0,0,141,0,79.5,59.5,1]}},
+            {"intrinsic": {"height": 120, "width": 160, "intrinsic_matrix": [140,0,0,0,141,0,79.5,59.5,1]}}]})",
+            known, 0, 0, "of 2 there"},
+        OthersCamera{
+            "nested.json",
+            R"({"intrinsics": {"fx": 140, "fy": 141, "cx": 79.5, "cy": 59.5}, "resolution": {"width": 160, "height": 120},
+            "depth_scale": 0.001})",
+            known, 0, 1000, "metres per unit"},
+        OthersCamera{"two.json", R"({"depth": {"fx": 140, "fy": 141, "cx": 79.5, "cy": 59.5, "w": 160, "h": 120},
+            "color": {"fx": 600, "fy": 600, "cx": 320, "cy": 240, "w": 640, "h": 480}})",
+                     known, 0, 0, "\"depth\" is used, of 2 there"},
+        OthersCamera{"nested_numbers.json",
+                     R"({"fx": 140, "fy": 141, "cx": 79.5, "cy": 59.5, "w": 160, "h": 120, "lens": {"k1": -0.3}})",
+                     known, 0, 0, "not used: \"lens.k1\""},
+        OthersCamera{"nerfstudio.json",
+                     R"({"fl_x": 140, "fl_y": 141, "cx": 80, "cy": 60, "w": 160, "h": 120, "frames": []})", known},
+        OthersCamera{"pairs.json",
+                     R"({"focal_length": [140, 141], "principal_point": [79.5, 59.5], "image_size": [160, 120]})",
+                     known},
+        OthersCamera{
+            "strings.json",
+            R"({"Fx": "140.0", "Fy": "141", "Cx": "79.5", "Cy": "59.5", "Width": "160", "Height": "120", "depthScale": "0.001"})",
+            known, 0, 1000, "metres per unit"},
+        OthersCamera{"four.json", "[140, 141, 79.5, 59.5]"},
+        OthersCamera{"twelve.json",
+                     R"({"K": [140, 0, 79.5, 0, 141, 59.5, 0, 0, 1], "dist": [0.1,0,0,0,0,0,0,0,0,0,0,0]})",
+                     {},
+                     0.1},
+        OthersCamera{"lens_object.json",
+                     R"({"K": [140, 0, 79.5, 0, 141, 59.5, 0, 0, 1], "distortion": {"k1": 0.1, "p2": 0}})",
+                     {},
+                     0.1}),
     [](const auto& info) {
         std::string name = info.param.name;
         std::ranges::replace(name, '.', '_');
         return name;
     });
+
+TEST(CamerasOfOthers16, of_two_bytes_a_character_are_read) {
+    const TemporaryFolder folder;
+    for (const bool little : {true, false}) {
+        std::string text = little ? "\xff\xfe" : "\xfe\xff";
+        for (const char c : std::string("140 0 79.5\r\n0 141 59.5\r\n0 0 1\r\n"))
+            text += little ? std::string{c, '\0'} : std::string{'\0', c};
+        EXPECT_EQ(read_camera_file(write_file(folder / "K.txt", text)).camera.pinhole.cy, 59.5);
+    }
+}
 
 TEST(CamerasOfOthersRefused, say_what_they_are_and_what_was_expected) {
     const TemporaryFolder folder;
@@ -136,8 +227,27 @@ TEST(CamerasOfOthersRefused, say_what_they_are_and_what_was_expected) {
             "w.xml",
             "<opencv_storage><camera_matrix><data>wide 0 79.5 0 141 5 0 0 1</data></camera_matrix></opencv_storage>"),
         "\"camera_matrix\": value 1 is not a finite number"));
+    EXPECT_TRUE(says(complaint("c.json", R"({"K": [[140,0,1],[0,141,1],[79.5,59.5,1]]})"), "expected fx 0 cx"));
+    EXPECT_TRUE(says(
+        complaint("s.json",
+                  R"({"left": {"fx": 1, "fy": 1, "cx": 1, "cy": 1}, "right": {"fx": 2, "fy": 1, "cx": 1, "cy": 1}})"),
+        "2 cameras (\"left\", \"right\"), and which took the depth is not said"));
     EXPECT_TRUE(
-        says(complaint("c.json", R"({"K": [[140,0,0],[0,141,0],[79.5,59.5,1]]})"), "row by row: expected fx 0 cx"));
+        says(complaint("i.json", R"({"fx": 140, "fy": 141, "ppx": 79.5, "ppy": 59.5, "width": 160, "height": 120,
+        "model": "distortion.inverse_brown_conrady", "coeffs": [0.1, 0, 0, 0, 0]})"),
+             "lenses given by their inverse are not read"));
+    EXPECT_TRUE(
+        says(complaint("a.json", R"({"camera_angle_x": 1.0, "frames": []})"), "\"camera_angle_x\" alone is no camera"));
+    EXPECT_TRUE(
+        says(complaint("k.json", R"({"CalibrationInformation": {"Cameras": []}})"), "Azure Kinect's calibration"));
+    EXPECT_TRUE(says(complaint("o.json", R"({"voxel": 1, "name": "x"})"), "both missing; it has \"name\", \"voxel\""));
+    EXPECT_TRUE(says(complaint("K.npy", "\x93NUMPY"), "a NumPy array, expected text"));
+    EXPECT_TRUE(says(complaint("bomb.yaml",
+                               "image_width: 1\na: &a [1,1,1,1,1,1,1,1,1,1]\nb: &b [*a,*a,*a,*a,*a,*a,*a,*a,*a,*a]\n"
+                               "c: &c [*b,*b,*b,*b,*b,*b,*b,*b,*b,*b]\nd0: &d [*c,*c,*c,*c,*c,*c,*c,*c,*c,*c]\ne: &e "
+                               "[*d,*d,*d,*d,*d,*d,*d,*d,*d,*d]\n"
+                               "f0: [*e,*e,*e,*e,*e,*e,*e,*e,*e,*e]\n"),
+                     "too many values for a camera"));
     EXPECT_TRUE(says(complaint("k.txt", "fx: 140\nfy: 141\ncx: 79.5\n"), "\"cy\" is missing"));
     EXPECT_TRUE(says(complaint("n.txt", "fx: 140\nfy: wide\ncx: 79.5\ncy: 1\n"), "\"fy\" is"));
     EXPECT_TRUE(says(complaint("t.txt", "Camera.fx: 140\nCamera.fx: 150\n"), "line 2: \"fx\" is there twice"));

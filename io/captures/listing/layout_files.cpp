@@ -9,6 +9,7 @@
 #include "projection/base/error.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <fmt/format.h>
@@ -186,6 +187,34 @@ std::string trouble_with(const fs::path& folder, const std::string& name) {
     return {};
 }
 
+namespace {
+
+/// Settings and tables that hold a camera, under names that do not say so: not used, but named.
+void tell_cameras_by_other_names(const fs::path& folder, std::vector<std::string>& warnings) {
+    constexpr std::size_t enough = 1 << 16, most_looks = 16;
+    constexpr std::array kinds{".yaml", ".yml", ".xml", ".txt", ".csv", ".cfg", ".conf", ".ini"};
+    std::size_t looks = 0;
+    for (const fs::path& file : files_in(folder)) {
+        if (std::ranges::find(kinds, lower_extension(file)) == kinds.end() || ++looks > most_looks)
+            continue;
+        try {
+            const std::string start = read_bytes(file, enough);
+            if (start.size() < enough &&
+                std::ranges::any_of(std::array{"fx", "Fx", "amera_matrix", "ameraMatrix"},
+                                    [&](const char* key) { return start.find(key) != std::string::npos; })) {
+                (void)read_camera_file(file);
+                warnings.push_back(fmt::format("{} holds a camera, and is not used: --camera {} takes it.",
+                                               file.filename().string(), file.string()));
+            }
+        } catch (const Outage&) {
+            throw;
+        } catch (const Error&) { // no camera after all
+        }
+    }
+}
+
+} // namespace
+
 std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::string>& warnings) {
     std::vector<fs::path> candidates, others;
     const auto calibrates = [](const fs::path& file) { // what speaks of a camera should be one, or is named
@@ -194,11 +223,12 @@ std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::str
     };
     for (const fs::path& file : files_in(folder)) {
         const std::string name = file.filename().string(), extension = lower_extension(file);
+        const std::string stem = file.stem().string();
         const bool json = extension == ".json", text = extension == ".txt";
         // Text files named after cameras are often poses or calibrations of another kind; JSON files rarely are.
         const bool promising =
             (json && speaks_of(file, {"cam", "intrinsic"}) && !speaks_of(file, {"traj", "pose", "extrinsic"})) ||
-            (text && speaks_of(file, {"intrinsic"}));
+            (text && (speaks_of(file, {"intrinsic"}) || stem == "K" || stem == "k" || stem == "cam_K"));
         if (name == "camera.json")
             candidates.insert(candidates.begin(), file);
         else if (promising)
@@ -228,6 +258,8 @@ std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::str
                     fmt::format("{}: not used as the camera: {}.", other->filename().string(), failure.what()));
         }
     }
+    if (!found)
+        tell_cameras_by_other_names(folder, warnings);
     return found;
 }
 
