@@ -232,6 +232,27 @@ float error_of_splat(CloudErrorSigns signs) {
     return std::sqrt(std::max(all * all - sure * sure, 0.0F) + share * share * sure * sure);
 }
 
+/// Of the square that each splat of a surface has to itself: what the middle one covers, opacity 1 counting as all.
+double covered_by(const PointSet& cloud, const Indices& which, double spacing) {
+    std::vector<float> areas(which.size());
+    std::ranges::transform(which, areas.begin(), [&](std::uint32_t i) {
+        const Splat& splat = cloud.splats[i];
+        const Axes axes = axes_of(splat);
+        return splat.opacity * splat.sigma[axes.middle] * splat.sigma[axes.longest];
+    });
+    constexpr double whole = 6.2832; // integral of a normal distribution of sigma 1
+    return whole * static_cast<double>(median_of_lengths(areas)) / (spacing * spacing);
+}
+
+void check_gaps(double covered, Findings& findings) {
+    constexpr double least = 0.2;
+    at_least(findings, Check::splat_gaps, covered, least, [&] {
+        return fmt::format("the splats cover {:.2g} % of their surface: rays pass between them, and most stays open. "
+                           "Check their scales, or keep x, y and z alone, which are computed as points.",
+                           100 * covered);
+    });
+}
+
 class SplatWork {
   public:
     SplatWork(const CloudSetup& setup, const PointSet& cloud, const std::optional<Vector3d>& scanner)
@@ -312,6 +333,8 @@ void SplatWork::of_surface(const Indices& which) {
     give_to_haze(surface, which);
     watch.lap("gather");
     result_.findings = sides.findings;
+    if (result_.spacing > 0)
+        check_gaps(covered_by(cloud_, which, result_.spacing), result_.findings);
     result_.notes.push_back(
         fmt::format("normals: the shortest axes of {} flat splats, planes through 16 neighbours for {} "
                     "others, {}.",

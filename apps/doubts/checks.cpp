@@ -73,6 +73,8 @@ constexpr std::array rows{
     CheckRow{Check::normals_to_sky, "normals_to_sky", "cloud", "mean rise of recorded normals of terrain",
              "below -0.5"},
     CheckRow{Check::sides, "sides", "cloud", "probability that the opposite of all sides found is right", "above 0.1"},
+    CheckRow{Check::splat_gaps, "splat_gaps", "cloud",
+             "share of their surface that Gaussian splats cover, as they stand", "below 0.2"},
     CheckRow{Check::coverage, "coverage", "result", "share of the valid pixels or points with a value", "below 0.2"},
     CheckRow{Check::all_open, "all_open", "result", "share of values that are 1 though there are hollows",
              "above 0.999"},

@@ -98,8 +98,9 @@ Attached attached_points(const Cloud& cloud, std::vector<float> visibility) {
     for (std::size_t i = 0; i < cloud.points.size(); ++i) {
         const bool has_value = !std::isnan(attached.per_point[i]);
         valid += cloud.points[i].allFinite();
-        known += has_value && cloud.points[i].allFinite();
-        sum += has_value ? static_cast<double>(attached.per_point[i]) : 0;
+        const bool counts = has_value && cloud.points[i].allFinite(); // haze has a value, and is no point
+        known += counts;
+        sum += counts ? static_cast<double>(attached.per_point[i]) : 0;
     }
     attached.coverage = valid > 0 ? static_cast<double>(known) / static_cast<double>(valid) : 0;
     attached.mean_visibility = known > 0 ? sum / static_cast<double>(known) : std::numeric_limits<double>::quiet_NaN();

@@ -56,6 +56,7 @@ enum class Check : std::uint8_t {
     normals_to_space,
     normals_to_sky,
     sides,
+    splat_gaps,
     // results
     coverage,
     all_open,

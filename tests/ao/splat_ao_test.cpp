@@ -2,6 +2,7 @@
 #include "ao/cloud/cloud_ao.h"
 #include "tests/support/points.h"
 
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <limits>
@@ -80,6 +81,22 @@ TEST(SplatAo, a_corner_is_as_dark_as_the_closed_form_says) {
         EXPECT_LT(is, error) << thickness;
         EXPECT_LT(is, 1.25 * expected) << thickness;
         EXPECT_GT(is, 0.4 * expected) << thickness;
+    }
+}
+
+/// Rays pass between splats that are far narrower than their distances: a result that is open, and no truth.
+TEST(SplatAo, gaps_between_splats_are_doubted) {
+    for (const auto& [sigma_by_spacing, gaps] : {std::pair(0.75, false), {0.3, false}, {0.1, true}}) {
+        Dice dice;
+        Scene scene = corner_of(4000, 0.05, dice);
+        for (Splat& splat : scene.splats)
+            splat.sigma *= static_cast<float>(sigma_by_spacing / 0.75);
+        const auto found = scene.seen(radius).findings;
+        const auto gap = std::ranges::find(found, Check::splat_gaps, &Finding::check);
+        ASSERT_NE(gap, found.end());
+        EXPECT_EQ(is_doubt(*gap), gaps) << gap->value;
+        EXPECT_NEAR(gap->value / (2 * std::numbers::pi * 0.87 * sigma_by_spacing * sigma_by_spacing), 1, 0.35)
+            << "the area of a Gaussian by the square of its own, with the middle opacity";
     }
 }
 

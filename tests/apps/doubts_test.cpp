@@ -1,6 +1,7 @@
 // A result that is implausible is doubtful, with reasons, wherever the result is told; a plausible one is not.
 #include "apps/doubts/checks.h"
 #include "apps/frame/frame_steps.h"
+#include "apps/frame/point_clouds.h"
 #include "apps/walk/batch.h"
 #include "io/cameras/camera_file.h"
 #include "io/images/image_file.h"
@@ -309,6 +310,13 @@ TEST_F(DoubtfulRun, writes_what_every_check_found) {
         EXPECT_NEAR(found("holes")["value"].get<double>(), scattered ? 252.0 / (48 * 64) : 1, scattered ? 1e-5 : 0.1);
         EXPECT_GT(frame["found"].size(), 10U) << frame;
     }
+}
+
+/// Haze among splats gets a value from the nearest surface, and is no point that the mean counts.
+TEST(attached_points, mean_over_valid_points_alone) {
+    Cloud cloud;
+    cloud.points = {{0, 0, 1}, {1, 0, 1}, Eigen::Vector3d::Constant(std::nan(""))};
+    EXPECT_NEAR(attached_points(cloud, {0.5F, 0.75F, 1.0F}).mean_visibility, 0.625, 1e-6);
 }
 
 TEST(checks, are_listed_by_help_and_in_the_readme) {
