@@ -1,6 +1,7 @@
 #include "io/captures/near_misses.h"
 
 #include "io/captures/listing/layouts.h"
+#include "io/clouds/format.h"
 #include "io/files.h"
 #include "io/images/format.h"
 #include "io/text.h"
@@ -8,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <map>
@@ -133,6 +135,18 @@ std::string of_pictures(const Pictures& pictures) {
            "channel. Pictures of a chessboard calibrate a camera: `scanshade refine --board COLUMNSxROWS`";
 }
 
+/// Of a text that is no cloud.
+std::string what_is_in_text(std::string_view start) {
+    const std::string_view line = start.substr(0, start.find_first_of("\r\n"));
+    std::string lower(line);
+    std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    const bool degrees = lower.find("lat") != std::string::npos && lower.find("lon") != std::string::npos;
+    return fmt::format("text that begins with {}: {}", in_quotes(line.substr(0, 40)),
+                       degrees ? "latitudes and longitudes are no lengths: project them to metres"
+                               : "no cloud, which is eight lines or more of x y z, also with intensity, colours, "
+                                 "normals, or names in the first line");
+}
+
 } // namespace
 
 std::string what_it_is(const fs::path& file, std::string_view start) {
@@ -149,10 +163,7 @@ std::string what_it_is(const fs::path& file, std::string_view start) {
         (trimmed(line).starts_with('{') || trimmed(line).starts_with('[')))
         return fmt::format("JSON: no capture by itself. Give the folder that it lies in, or a camera with --camera; {}",
                            more);
-    return fmt::format(
-        "text that begins with {}: no cloud, which is eight lines or more of x y z, also with intensity, "
-        "colours, normals, or names in the first line; {}",
-        in_quotes(line.substr(0, 40)), more);
+    return fmt::format("{}; {}", what_is_in_text(start), more);
 }
 
 std::string why_no_frames(const fs::path& folder) {
@@ -179,6 +190,16 @@ std::string why_no_frames(const fs::path& folder) {
     }
     if (const Pictures pictures = pictures_among(files); pictures.count > 0)
         lines.push_back(of_pictures(pictures));
+    constexpr std::array tables{".txt", ".csv", ".asc", ".dat"};
+    for (const fs::path& file : files) {
+        constexpr std::size_t enough = 4096;
+        if (!lines.empty() || std::ranges::find(tables, lower_extension(file)) == tables.end())
+            continue;
+        const std::string start = read_bytes(file, enough);
+        lines.push_back(fmt::format("{}: {}", file.filename().string(),
+                                    is_cloud(start, file) ? "points as text, beside other files: give the file itself"
+                                                          : what_is_in_text(start)));
+    }
     std::string text = files.empty()
                            ? ": it holds no files"
                            : fmt::format(": it holds {} ({})", counted(files.size(), "file"), kinds_of(files));

@@ -164,6 +164,11 @@ cv::Vec3b bgr_of(std::uint32_t bits) {
     return {static_cast<uchar>(bits), static_cast<uchar>(bits >> 8), static_cast<uchar>(bits >> 16)};
 }
 
+/// A byte of colour that its file calls a signed one.
+bool is_signed_byte(const CloudRecords& records, std::size_t field) {
+    return records.fields[field].type == Scalar::int8;
+}
+
 /// What colours are divided by to be bytes. LAS has 16 bits per channel, but many writers store 8-bit values in them;
 /// other files have 8 or 16 bits, or fractions of 1.
 double colour_step_in(const CloudRecords& records, const std::array<std::size_t, 3>& bgr) {
@@ -201,7 +206,9 @@ std::vector<cv::Vec3b> colours_of(const CloudRecords& records) {
         }
         cv::Vec3b colour;
         for (std::size_t channel = 0; channel < 3; ++channel) {
-            const double value = value_at(records, record, (*fields.bgr)[channel]) / step;
+            const double stored = value_at(records, record, (*fields.bgr)[channel]);
+            const double value =
+                (is_signed_byte(records, (*fields.bgr)[channel]) && stored < 0 ? stored + 256 : stored) / step;
             colour[static_cast<int>(channel)] = cv::saturate_cast<uchar>(step == 256 ? std::floor(value) : value);
         }
         colours.push_back(colour);
@@ -259,7 +266,9 @@ void replace_colours(const CloudRecords& records, std::span<const cv::Vec3b> col
             const std::size_t field = (*fields.bgr)[static_cast<std::size_t>(channel)];
             replacements.push_back({field, [&records, colours, channel, full,
                                             type = records.fields[field].type](std::size_t point, std::string_view) {
-                                        return encoded(records, type, full * colours[point][channel]);
+                                        const double value = full * colours[point][channel];
+                                        return encoded(records, type,
+                                                       type == Scalar::int8 && value > 127 ? value - 256 : value);
                                     }});
         }
     } else {

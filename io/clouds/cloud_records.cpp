@@ -197,11 +197,16 @@ ColourFields colour_fields(const CloudRecords& records) {
         if (!field)
             continue;
         const CloudField& f = records.fields[*field];
-        if (f.count == 1 && !f.list_length && size_of(f.type) == 4)
+        if (f.count == 1 && !f.list_length && (records.text() || size_of(f.type) == 4))
             found.packed = field;
     }
     // The last that are there count; "Rf" are CloudCompare's fractions.
-    constexpr std::array<std::array<const char*, 3>, 4> names{{{"bf", "gf", "rf"},
+    constexpr std::array<std::array<const char*, 3>, 9> names{{{"b8", "g8", "r8"},
+                                                               {"scalar_blue", "scalar_green", "scalar_red"},
+                                                               {"col_b", "col_g", "col_r"},
+                                                               {"colorb", "colorg", "colorr"},
+                                                               {"color_b", "color_g", "color_r"},
+                                                               {"bf", "gf", "rf"},
                                                                {"b", "g", "r"},
                                                                {"diffuse_blue", "diffuse_green", "diffuse_red"},
                                                                {"blue", "green", "red"}}};
@@ -223,8 +228,9 @@ std::uint32_t packed_bits(const CloudRecords& records, std::string_view record, 
         return raw<std::uint32_t>(record.data() + place.offset, records.encoding == CloudRecords::Encoding::big_endian);
     const double value = value_at(records, record, field);
     if (std::isnan(value))
-        return 0; // a NaN's text has lost its bits
-    if (floats)
+        return 0;                     // a NaN's text has lost its bits
+    constexpr double full = 0xffffff; // no packed colour as a float is as large as one: these are written as numbers
+    if (floats && !(value >= 1 && value <= full))
         return std::bit_cast<std::uint32_t>(static_cast<float>(value));
     return value < 0 ? static_cast<std::uint32_t>(nearest<std::int32_t>(value)) : nearest<std::uint32_t>(value);
 }
@@ -300,6 +306,12 @@ std::string between(std::string_view header, std::string points, std::string_vie
     points.insert(0, header);
     points += after;
     return points;
+}
+
+void check_point_count(std::uint64_t count, const std::filesystem::path& file) {
+    constexpr std::uint64_t most_points = 0x7fffffff; // points are numbered with 32 bits
+    if (count > most_points)
+        throw Error(fmt::format("{}: {} points, at most {} are read", file.string(), count, most_points));
 }
 
 bool TextRecords::next() {

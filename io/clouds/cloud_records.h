@@ -123,6 +123,9 @@ struct FieldAddition {
 /// A file's bytes: `points` between these; its memory is used again.
 [[nodiscard]] std::string between(std::string_view header, std::string points, std::string_view after);
 
+/// Throws Error for more points than 32 bits number.
+void check_point_count(std::uint64_t count, const std::filesystem::path& file);
+
 /// Lines of an ASCII body; skips blank ones.
 class TextRecords {
   public:

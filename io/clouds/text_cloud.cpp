@@ -2,7 +2,9 @@
 // assumed.
 #include "io/clouds/cloud_records.h"
 
+#include "io/clouds/text_names.h"
 #include "io/text.h"
+#include "io/utf16.h"
 #include "projection/base/error.h"
 
 #include <algorithm>
@@ -26,17 +28,42 @@ constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 /// What three columns beside each other hold.
 enum class Triple { colours, normals, other };
 
-/// Told by their values in the first lines: normals are as long as 1, colours are bytes.
+/// Told by their values in the first lines: normals are as long as 1, colours are bytes or fractions of 1.
 Triple triple_in(const std::vector<std::vector<double>>& lines, std::size_t first) {
     constexpr double written_with_two_digits = 0.02;
-    bool normals = !lines.empty(), colours = !lines.empty();
+    bool normals = !lines.empty(), colours = !lines.empty(), fractions = !lines.empty();
     for (const auto& line : lines) {
         const Eigen::Vector3d value(line[first], line[first + 1], line[first + 2]);
         normals = normals && std::abs(value.norm() - 1) <= written_with_two_digits;
         colours = colours && (value.array() >= 0).all() && (value.array() <= 255).all() &&
                   (value.array() == value.array().floor()).all();
+        fractions = fractions && (value.array() >= 0).all() && (value.array() <= 1).all();
     }
-    return normals ? Triple::normals : colours ? Triple::colours : Triple::other;
+    return normals ? Triple::normals : colours || fractions ? Triple::colours : Triple::other;
+}
+
+/// Whether two whole numbers that go on step by step stand before the coordinates, as rows and columns of a scan do in
+/// FARO's text. Maps of whole metres have a height behind them, and no three numbers that are not whole.
+bool is_grid_first(const std::vector<std::vector<double>>& lines) {
+    constexpr std::size_t fewest = 16, columns = 5;
+    if (lines.size() < fewest || lines.front().size() < columns ||
+        (lines.front().size() > columns && triple_in(lines, 3) != Triple::other))
+        return false;
+    const auto whole = [](double value) { return value == std::floor(value); };
+    std::array<std::size_t, columns> fractions{};
+    std::size_t steps = 0;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        for (std::size_t k = 0; k < columns; ++k)
+            fractions[k] += !whole(lines[i][k]);
+        if (lines[i][0] < 0 || lines[i][1] < 0)
+            return false;
+        const double rows = i == 0 ? 0 : lines[i][0] - lines[i - 1][0],
+                     along = i == 0 ? 1 : lines[i][1] - lines[i - 1][1];
+        steps += (rows == 0 && along == 1) || (along == 0 && rows == 1) || rows == 1 || along == 1;
+    }
+    const auto most = [&](std::size_t count) { return 10 * count > 9 * lines.size(); };
+    return fractions[0] + fractions[1] == 0 && most(fractions[2]) && most(fractions[3]) && most(fractions[4]) &&
+           most(steps);
 }
 
 /// The columns of lines without names: x y z, then colours and normals as their values tell, and an intensity before or
@@ -44,6 +71,14 @@ Triple triple_in(const std::vector<std::vector<double>>& lines, std::size_t firs
 /// to the sixth are colours.
 std::vector<std::string> usual_names(const std::vector<std::vector<double>>& lines, bool colours_first) {
     const std::size_t columns = lines.empty() ? 3 : lines.front().size();
+    if (is_grid_first(lines)) {
+        std::vector<std::vector<double>> rest;
+        for (const auto& line : lines)
+            rest.emplace_back(line.begin() + 2, line.end());
+        std::vector<std::string> names = usual_names(rest, colours_first);
+        names.insert(names.begin(), {"row", "column"});
+        return names;
+    }
     std::vector<std::string> names{"x", "y", "z"};
     const auto take_triples = [&](std::size_t end) { // false where one of them is neither
         while (names.size() + 3 <= end) {
@@ -128,15 +163,43 @@ std::string name_in_cell(std::string_view cell) {
     return name.empty() ? "unnamed" : name; // pandas writes the number of each line in a column without a name
 }
 
-/// A text of cells between commas or semicolons, as words between blanks; nothing for other texts. With semicolons, a
-/// comma is a decimal point.
-std::optional<std::string> words_for_cells(std::string_view bytes) {
+/// Whether the line's words are numbers, three or more with a comma for their points: "2,39 0,5 1,0 255".
+bool has_decimal_commas(std::string_view line) {
+    const auto all = words(line);
+    const auto commas = [](std::string_view word) { return std::ranges::count(word, ','); };
+    return std::ranges::count(all, 1, commas) >= 3 && std::ranges::all_of(all, [&](std::string_view word) {
+               return commas(word) <= 1 && word.front() != ',' && word.back() != ',' &&
+                      word.find_first_not_of("+-0123456789,eE") == std::string_view::npos;
+           });
+}
+
+/// Where the first line begins that is no comment, behind a byte order mark and Excel's "sep=;".
+std::size_t first_line_of_cells(std::string_view bytes) {
     std::size_t begin = bytes.starts_with(byte_order_mark) ? byte_order_mark.size() : 0;
-    while (begin < bytes.size() && (bytes[begin] == '#' || bytes[begin] == '\n' || bytes[begin] == '\r'))
+    const auto skips = [&] {
+        return bytes[begin] == '#' || bytes[begin] == '\n' || bytes[begin] == '\r' ||
+               bytes.substr(begin).starts_with("sep=");
+    };
+    while (begin < bytes.size() && skips())
         begin = std::min(bytes.find('\n', begin), bytes.size() - 1) + 1;
-    const std::string_view before = bytes.substr(0, begin);
+    return begin;
+}
+
+/// A text of cells between commas or semicolons, as words between blanks; nothing for other texts. With semicolons or
+/// blanks between cells, a comma is a decimal point.
+std::optional<std::string> words_for_cells(std::string_view bytes) {
+    const std::size_t begin = first_line_of_cells(bytes);
+    const std::string_view before = bytes.starts_with("sep=") ? std::string_view() : bytes.substr(0, begin);
     bytes.remove_prefix(begin);
     const std::string_view first = bytes.substr(0, bytes.find('\n'));
+    const std::string_view rest = bytes.substr(first.size());
+    const std::string_view second = rest.substr(0, rest.find('\n', 1));
+    const bool names = has_decimal_commas(second) && first.find_first_of(";,") == std::string_view::npos;
+    if (names || has_decimal_commas(first)) {
+        std::string text(bytes);
+        std::ranges::replace(text, ',', '.');
+        return std::string(before) + text;
+    }
     const char between = first.find(';') != std::string_view::npos ? ';' : ',';
     if (first.find(between) == std::string_view::npos)
         return std::nullopt;
@@ -148,69 +211,28 @@ std::optional<std::string> words_for_cells(std::string_view bytes) {
             text += (text.empty() ? "" : " ") + name_in_cell(cell);
         at = end + 1;
     }
-    text += bytes.substr(first.size());
+    text += rest;
     std::ranges::replace(text, between, ' ');
     if (between == ';')
         std::ranges::replace(text, ',', '.');
+    if (second.find('"') != std::string_view::npos) // numbers, too, in quotes
+        std::erase(text, '"');
     return std::string(before) + text;
 }
 
-/// "//X Y Z Rf Gf Bf" or "Easting Northing Height [m]" as names of ours.
-std::vector<std::string> names_in(const std::vector<std::string_view>& words) {
-    std::vector<std::string> names;
-    for (std::string_view word : words) {
-        while (word.starts_with('/') || word.starts_with('#'))
-            word.remove_prefix(1);
-        std::string name(word);
-        std::transform(name.begin(), name.end(), name.begin(),
-                       [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-        if (const std::size_t unit = name.find_first_of("[("); unit != std::string::npos)
-            name.erase(name.find_last_not_of('_', std::max<std::size_t>(unit, 1) - 1) + 1);
-        if (!name.empty())
-            names.push_back(name);
-    }
-    struct Known {
-        std::string_view theirs, ours;
-    };
-    constexpr std::array known{Known{"rf", "red"},    Known{"gf", "green"},    Known{"bf", "blue"},
-                               Known{"r", "red"},     Known{"g", "green"},     Known{"b", "blue"},
-                               Known{"easting", "x"}, Known{"east", "x"},      Known{"northing", "y"},
-                               Known{"north", "y"},   Known{"elevation", "z"}, Known{"height", "z"}};
-    for (const auto& [theirs, ours] : known)
-        if (const auto found = std::ranges::find(names, theirs);
-            found != names.end() && std::ranges::find(names, ours) == names.end())
-            *found = ours;
-    return names;
-}
-
-bool names_axes(const std::vector<std::string>& names) {
-    return std::ranges::all_of(std::array{"x", "y", "z"},
-                               [&](const char* axis) { return std::ranges::count(names, axis) == 1; });
-}
-
-/// The metres of "X [mm]"; 1 where no unit is named.
-double unit_in(std::string_view line) {
-    struct Unit {
-        std::string_view name;
-        double metres;
-    };
-    constexpr std::array units{Unit{"mm", 0.001}, Unit{"cm", 0.01}, Unit{"dm", 0.1}, Unit{"km", 1000},
-                               Unit{"ft", 0.3048}};
-    const std::size_t open = line.find_first_of("[("), close = line.find_first_of("])");
-    if (open == std::string_view::npos || close == std::string_view::npos || close < open)
-        return 1;
-    const auto found = std::ranges::find(units, line.substr(open + 1, close - open - 1), &Unit::name);
-    return found == units.end() ? 1 : found->metres;
+/// What has line ends of old Macintoshes, or two bytes a character, as texts usually are; nothing for other texts.
+std::optional<std::string> usual_text(std::string_view bytes) {
+    if (bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff"))
+        return plain_text(std::string(bytes));
+    if (bytes.find('\n') != std::string_view::npos || bytes.find('\r') == std::string_view::npos)
+        return std::nullopt;
+    std::string text(bytes);
+    std::ranges::replace(text, '\r', '\n');
+    return text;
 }
 
 bool all_numbers(const std::vector<std::string_view>& words) {
     return std::all_of(words.begin(), words.end(), [](std::string_view word) { return number(word).has_value(); });
-}
-
-void check_point_count(std::uint64_t count, const fs::path& file) {
-    constexpr std::uint64_t most_points = 0x7fffffff; // points are numbered with 32 bits
-    if (count > most_points)
-        throw Error(fmt::format("{}: {} points, at most {} are read", file.string(), count, most_points));
 }
 
 /// Throws Error unless the line has a number for each field.
@@ -256,6 +278,19 @@ bool colours_come_first(std::string_view body, const fs::path& file, std::vector
     return false;
 }
 
+/// Whether `rest`, from a line on that begins with `word`, is a few lines without numbers: "# end of file".
+bool is_end(std::string_view word, std::string_view rest) {
+    constexpr std::size_t longest = 1000;
+    if (std::string_view("+-.0123456789").find(word[0]) != std::string_view::npos || number(word) ||
+        rest.size() > longest)
+        return false;
+    TextRecords lines(rest, 1);
+    while (lines.next())
+        if (number(lines.words()[0]))
+            return false;
+    return true;
+}
+
 /// The lines of `body` as records of equally many words. A number alone begins the next scan of a .pts.
 void read_lines(CloudRecords& records, std::string_view body, int first_line, const fs::path& file,
                 std::vector<std::string>& warnings) {
@@ -273,8 +308,15 @@ void read_lines(CloudRecords& records, std::string_view body, int first_line, co
             block = true;
             continue;
         }
-        if (records.fields.empty())
+        if (records.fields.empty()) {
             records.fields = fields_named(names_of_first(line.size()));
+            if (records.fields[0].name == "row")
+                warnings.push_back(file.string() +
+                                   ": the first two columns count rows and columns of a scan: x y z are "
+                                   "taken behind them.");
+        }
+        if (is_end(lines.words()[0], body.substr(behind)))
+            break;
         check_numbers(lines, records.fields, file);
         if (std::exchange(block, false)) { // the count between blocks is no part of the records
             const auto start = static_cast<std::size_t>(line.front().data() - body.data());
@@ -461,11 +503,13 @@ TextHeader text_header(std::string_view bytes) {
                 break;
             }
             header.said = whole_number(line[0]);
-        } else if (const auto names = names_in(line); names_axes(names)) {
-            header.names = names;
+        } else if (const ColumnNames names = column_names(line); names_axes(names.ours)) {
+            header.names = names.ours;
             header.names_end = static_cast<std::size_t>(text.data() + text.size() - bytes.data());
             in_comment = comment;
-            header.metres = unit_in(text);
+            header.metres = names.metres;
+        } else if (!line.empty() && !header.names.empty() && is_line_of_units(line)) {
+            header.metres = metres_in(line[0]);
         } else if (!line.empty() && !comment) {
             if (header.names.empty()) // else a point, whose words are refused one by one
                 header.odd = text;
@@ -484,13 +528,18 @@ bool is_text_cloud(std::string_view start) {
     constexpr std::size_t enough = 4096, not_a_matrix = 8;
     const bool cut = start.size() >= enough;
     start = start.substr(0, enough);
+    const std::optional<std::string> usual = usual_text(start);
+    start = usual ? *usual : start;
     const std::optional<std::string> of_cells = words_for_cells(start);
     start = of_cells ? *of_cells : start;
     const TextHeader header = text_header(start);
     const auto lines = first_numbers(start.substr(header.length), cut);
     if (!header.names.empty()) { // words in other columns are refused by their line
         const std::string_view first = start.substr(header.length, start.find('\n', header.length) - header.length);
-        return std::ranges::count(header.names, "qw") == 0 && // poses
+        constexpr std::array of_poses{"qw",     "q_w",           "qx",   "q_x", "rot_w",
+                                      "quat_w", "orientation_w", "roll", "yaw", "heading"};
+        return std::ranges::none_of(of_poses,
+                                    [&](const char* name) { return std::ranges::count(header.names, name) > 0; }) &&
                words(first).size() == header.names.size() && (lines.size() >= not_a_matrix || lines.empty());
     }
     if (!header.odd.empty() || lines.size() < not_a_matrix)
@@ -513,6 +562,8 @@ bool is_text_cloud(std::string_view start) {
 }
 
 CloudRecords read_xyz(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
+    const std::optional<std::string> usual = usual_text(bytes);
+    bytes = usual ? *usual : bytes;
     const std::optional<std::string> of_cells = words_for_cells(bytes);
     bytes = of_cells ? *of_cells : bytes;
     const TextHeader header = text_header(bytes);
@@ -548,75 +599,6 @@ std::string text_bytes(const CloudRecords& records, std::string points, const st
     if (!read.names.empty())
         header.insert(read.names_end, added);
     return between(header, std::move(points), records.after);
-}
-
-namespace {
-
-/// nuScenes' points have a fifth number, the scanner's ring: a whole one below 64. It calls its files .pcd.bin.
-bool has_rings(std::string_view bytes, const fs::path& file) {
-    if (file.stem().extension() == ".pcd")
-        return true;
-    constexpr std::size_t stride = 20, ring = 16;
-    constexpr double rings = 64;
-    if (bytes.size() % stride != 0)
-        return false;
-    for (std::size_t at = ring; at < bytes.size(); at += stride)
-        if (const double value = decoded(bytes.data() + at, Scalar::float32, false);
-            !(value >= 0 && value < rings && value == std::floor(value)))
-            return false;
-    return true;
-}
-
-/// Records of other fields, read as these, hold numbers that no scanner measures: absurd, or next to nothing (whole
-/// numbers read as floats), or a reflectance that is negative or above 16 bits.
-void check_sweep(std::string_view bytes, std::size_t stride, const fs::path& file) {
-    constexpr float absurd = 1e6F, next_to_nothing = 1e-30F, most_reflectance = 65535;
-    std::size_t odd = 0, all = 0;
-    for (std::size_t at = 0; at + stride <= bytes.size(); at += stride, ++all) {
-        std::array<float, 4> p{};
-        for (std::size_t i = 0; i < p.size(); ++i)
-            p[i] = static_cast<float>(decoded(bytes.data() + at + i * sizeof(float), Scalar::float32, false));
-        const bool fits = std::ranges::none_of(p, [](float value) {
-            return std::abs(value) > absurd || (value != 0 && std::abs(value) < next_to_nothing);
-        });
-        odd += !fits || p[3] < 0 || p[3] > most_reflectance;
-    }
-    constexpr std::size_t few = 20; // one of so many
-    if (odd * few > all)
-        throw Error(
-            fmt::format("{}: does not look like records of x y z reflectance (16 bytes) or x y z intensity ring "
-                        "(20): {} of {} have absurd values or a negative reflectance. Convert it to PLY or PCD, "
-                        "which name their fields",
-                        file.string(), odd, all));
-}
-
-} // namespace
-
-CloudRecords read_kitti(std::string_view bytes, const fs::path& file, std::vector<std::string>&) {
-    const bool rings = has_rings(bytes, file);
-    const std::vector<const char*> names =
-        rings ? std::vector{"x", "y", "z", "intensity", "ring"} : std::vector{"x", "y", "z", "reflectance"};
-    const std::size_t stride = names.size() * sizeof(float);
-    if (bytes.size() % stride != 0)
-        throw Error(fmt::format("{}: {} bytes are not whole points of {} ({} as floats)", file.string(), bytes.size(),
-                                stride, fmt::join(names, " ")));
-    check_point_count(bytes.size() / stride, file);
-    check_sweep(bytes, stride, file);
-    CloudRecords records;
-    records.encoding = CloudRecords::Encoding::binary;
-    records.point_count = bytes.size() / stride;
-    records.header = fmt::format("ply\nformat binary_little_endian 1.0\ncomment {}, z up, metres\nelement vertex {}\n",
-                                 rings ? "nuScenes sweep: x right, y forward" : "KITTI sweep: x forward, y left",
-                                 records.point_count);
-    for (const char* name : names) {
-        records.header += fmt::format("property float {}\n", name);
-        records.fields.push_back({name, Scalar::float32, 1, std::nullopt, sizeof(float) * records.fields.size()});
-    }
-    records.header += "end_header\n";
-    records.stride = stride;
-    records.points = bytes;
-    records.grid = {static_cast<int>(records.point_count), 1};
-    return records;
 }
 
 } // namespace scanshade

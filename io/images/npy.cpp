@@ -197,7 +197,7 @@ DepthArray depth_array_in(std::string_view bytes, const Path& file) {
         shape.erase(shape.begin());
     if (shape.size() != 2)
         refuse(file, fmt::format("npy of {} dimensions, expected an image's 2", shape.size()));
-    constexpr std::uint64_t narrow = 4, many = 64; // x y z, x y z intensity: no camera has such images
+    constexpr std::uint64_t narrow = 10, many = 64; // x y z with colours and normals: no camera has such images
     if (std::min(shape[0], shape[1]) <= narrow && std::max(shape[0], shape[1]) >= many)
         refuse(file,
                fmt::format("npy of {}x{} looks like points, expected a depth image; clouds are read from PLY, PCD "

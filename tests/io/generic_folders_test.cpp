@@ -113,6 +113,19 @@ TEST_F(Made, known_layouts_name_the_parts_that_they_ignore) {
     EXPECT_TRUE(warned(open_capture(folder / "kitti").warnings, "not used: image_2."));
 }
 
+TEST_F(Made, cameras_by_other_names_are_taken_or_named) {
+    depth("depth/0.png");
+    text("settings.yaml", "Camera.fx: 140\nCamera.fy: 140\nCamera.cx: 31.5\nCamera.cy: 23.5\n");
+    const Capture named = open_capture(folder.path());
+    EXPECT_FALSE(named.camera);
+    EXPECT_TRUE(warned(named.warnings, "settings.yaml holds a camera, and is not used: --camera"));
+    text("K.txt", "140 0 31.5\n0 140 23.5\n0 0 1\n");
+    const Capture taken = open_capture(folder.path());
+    ASSERT_TRUE(taken.camera);
+    EXPECT_EQ(taken.camera->pinhole.fx, 140);
+    EXPECT_FALSE(warned(taken.warnings, "settings.yaml"));
+}
+
 TEST_F(Made, colmaps_models_are_no_clouds) {
     for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"})
         text(name, std::string(32, '\0'));

@@ -52,6 +52,25 @@ INSTANTIATE_TEST_SUITE_P(Of, ForeignFiles,
                              return name;
                          });
 
+TEST(NearMisses, of_folders_tell_why_their_texts_are_no_clouds) {
+    const auto complaint = [&](const char* name, const std::string& text, bool beside) {
+        const TemporaryFolder folder;
+        write_file(folder / name, text);
+        if (beside)
+            write_file(folder / "notes.md", "hello\n");
+        return refusal([&] { (void)open_capture(folder.path()); });
+    };
+    std::string points;
+    for (int k = 0; k < 16; ++k)
+        points += std::to_string(7 * k % 4) + "," + std::to_string(7 * k / 4 % 4) + ",1\n";
+    EXPECT_EQ(complaint("c.csv", "x,y,z\n" + points, false), "") << "nothing but tables: clouds";
+    EXPECT_TRUE(says(complaint("c.csv", "x,y,z\n" + points, true),
+                     "c.csv: points as text, beside other files: give the file itself"));
+    EXPECT_TRUE(says(complaint("c.txt", "pt0 1 2 3\npt1 1 2 3\n", false),
+                     "c.txt: text that begins with \"pt0 1 2 3\": no cloud"));
+    EXPECT_TRUE(says(complaint("c.txt", "lat lon alt\n48 11 500\n", false), "latitudes and longitudes are no lengths"));
+}
+
 TEST(NearMisses, of_files_tell_text_json_and_what_is_unknown) {
     const TemporaryFolder folder;
     const auto complaint = [&](const char* name, const std::string& bytes) {

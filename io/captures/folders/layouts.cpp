@@ -290,11 +290,12 @@ bool is_colmap_model(const fs::path& file) {
         file.filename().string());
 }
 
-/// A .txt or .asc file that begins with points.
+/// A file of text that begins with points.
 bool is_cloud_in_text(const fs::path& file) {
     constexpr std::size_t enough = 4096;
     const std::string extension = lower_extension(file);
-    return (extension == ".txt" || extension == ".asc") && is_cloud(read_bytes(file, enough), file);
+    return (extension == ".txt" || extension == ".asc" || extension == ".csv" || extension.starts_with(".xyz")) &&
+           is_cloud(read_bytes(file, enough), file);
 }
 
 } // namespace
@@ -306,6 +307,9 @@ std::optional<Listing> list_clouds(const fs::path& folder) {
                          [](const fs::path& file) { return has_cloud_extension(file) && !is_colmap_model(file); });
     if (clouds.empty()) // beside others a text is more likely a list
         std::ranges::copy_if(files, std::back_inserter(clouds), &is_cloud_in_text);
+    const auto is_table = [](const fs::path& file) { return lower_extension(file) == ".csv"; };
+    if (!std::ranges::all_of(files, is_table)) // a table beside others is what they were recorded with
+        std::erase_if(clouds, is_table);
     Listing listing;
     for (const fs::path& file : clouds) {
         CaptureEntry entry;
