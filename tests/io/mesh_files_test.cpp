@@ -101,6 +101,13 @@ INSTANTIATE_TEST_SUITE_P(
                    "buffers": [{"byteLength": 12, "uri": "data:;base64,AAAAAAAAAAAAAAAA"}]})",
                 "node 0: primitive 0: accessor 0: 9 elements from byte 0 on do not fit into a buffer view of 12 bytes"},
         Refused{"a.gltf",
+                R"({"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes":
+                   {"POSITION": 0}, "indices": 1}]}], "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3",
+                   "count": 1}, {"bufferView": 0, "componentType": 5120, "type": "SCALAR", "count": 3}],
+                   "bufferViews": [{"buffer": 0, "byteLength": 12}],
+                   "buffers": [{"byteLength": 12, "uri": "data:;base64,/////wAAAAAAAAAA"}]})",
+                "node 0: primitive 0: its indices are no whole numbers without a sign"},
+        Refused{"a.gltf",
                 R"({"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"mode": 0,
                    "attributes": {}, "extensions": {"KHR_gaussian_splatting": {"kernel": "ellipse"}}}]}]})",
                 "Gaussian splats (KHR_gaussian_splatting, kernel \"ellipse\") are read from .glb, PLY, .splat and "

@@ -119,8 +119,9 @@ class SceneReader {
         std::vector<std::size_t> corners;
         if (primitive.contains("indices")) {
             const Accessor indices(gltf_, whole_in(primitive, "indices"));
-            if (indices.is_float() || indices.width() != 1)
-                throw Error("its indices are no whole numbers");
+            if (!indices.is_unsigned() || indices.width() != 1)
+                throw Error("its indices are no whole numbers without a sign");
+            require_memory(sizeof(std::size_t) * indices.count(), counted(indices.count(), "index"));
             corners.reserve(indices.count());
             for (std::size_t i = 0; i < indices.count(); ++i) {
                 corners.push_back(indices.whole(i));
@@ -131,6 +132,8 @@ class SceneReader {
             for (std::size_t i = 0; i < vertices; ++i)
                 corners.push_back(i);
         }
+        constexpr std::uint64_t bytes_each = 80; // strips have a triangle for each corner; coordinates come later
+        require_memory(bytes_each * corners.size(), counted(corners.size(), "corner"));
         std::vector<std::array<std::size_t, 3>> triangles;
         if (mode == triangles_mode)
             for (std::size_t i = 2; i < corners.size(); i += 3)
@@ -155,6 +158,8 @@ class SceneReader {
             if (set == read_.mesh.sets.size())
                 read_.mesh.sets.emplace_back();
             std::vector<TextureCorners>& all = read_.mesh.sets[set];
+            require_memory(2 * sizeof(TextureCorners) * (read_.mesh.triangles.size() + triangles.size()),
+                           fmt::format("{} of {}", name, counted(triangles.size(), "triangle")));
             all.resize(read_.mesh.triangles.size(), no_place());
             for (const auto& triangle : triangles) {
                 TextureCorners& corners = all.emplace_back();

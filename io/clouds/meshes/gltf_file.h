@@ -73,9 +73,10 @@ class Accessor {
     [[nodiscard]] std::size_t count() const { return count_; }
     [[nodiscard]] std::size_t width() const { return width_; } ///< numbers in an element
     [[nodiscard]] bool is_float() const { return type_ == 5126; }
+    [[nodiscard]] bool is_unsigned() const { return type_ == 5121 || type_ == 5123 || type_ == 5125; }
     /// A number, 0 .. 1 or -1 .. 1 where integers stand for fractions.
     [[nodiscard]] double operator()(std::size_t element, std::size_t number) const;
-    /// An index of a vertex.
+    /// An index of a vertex; only where is_unsigned().
     [[nodiscard]] std::size_t whole(std::size_t element) const {
         return static_cast<std::size_t>(stored(data_ + element * stride_));
     }

@@ -158,6 +158,11 @@ class ObjReader {
         Corner before = corner_in(line[2]);
         for (std::size_t i = 3; i < line.size(); ++i) {
             const Corner here = corner_in(line[i]);
+            if (triangles_.size() ==
+                triangles_.capacity()) {                 // a corner of a polygon takes as little as two bytes of text
+                constexpr std::uint64_t bytes_each = 88; // with the coordinates that come later
+                require_memory(2 * bytes_each * triangles_.size(), counted(triangles_.size(), "triangle"));
+            }
             triangles_.push_back({first, before, here});
             read_.mesh.material.push_back(material_);
             before = here;
