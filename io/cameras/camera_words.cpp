@@ -175,8 +175,9 @@ void find_cameras(const Json& value, const std::string& path, const Json& around
         return;
     }
     Json numbers_here = Json::object();
+    constexpr std::size_t enough = 100; // many numbers about many objects would take long
     for (const auto& [key, entry] : object.items())
-        if (entry.is_number())
+        if (entry.is_number() && numbers_here.size() < enough)
             numbers_here[key] = entry;
     for (const auto& [key, entry] : value.items())
         if (entry.is_structured())

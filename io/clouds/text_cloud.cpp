@@ -189,7 +189,8 @@ std::size_t first_line_of_cells(std::string_view bytes) {
 /// blanks between cells, a comma is a decimal point.
 std::optional<std::string> words_for_cells(std::string_view bytes) {
     const std::size_t begin = first_line_of_cells(bytes);
-    const std::string_view before = bytes.starts_with("sep=") ? std::string_view() : bytes.substr(0, begin);
+    const std::string_view before =
+        bytes.substr(0, begin).find("sep=") == std::string_view::npos ? bytes.substr(0, begin) : std::string_view();
     bytes.remove_prefix(begin);
     const std::string_view first = bytes.substr(0, bytes.find('\n'));
     const std::string_view rest = bytes.substr(first.size());

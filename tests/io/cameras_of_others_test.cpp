@@ -2,6 +2,7 @@
 #include "io/cameras/camera_file.h"
 #include "tests/support/files.h"
 
+#include <chrono>
 #include <gtest/gtest.h>
 
 namespace scanshade {
@@ -205,6 +206,21 @@ TEST(CamerasOfOthers16, of_two_bytes_a_character_are_read) {
             text += little ? std::string{c, '\0'} : std::string{'\0', c};
         EXPECT_EQ(read_camera_file(write_file(folder / "K.txt", text)).camera.pinhole.cy, 59.5);
     }
+}
+
+TEST(CamerasOfOthers16, amid_many_numbers_are_found_soon) {
+    std::string many = "{";
+    for (int i = 0; i < 20000; ++i)
+        many += "\"a" + std::to_string(i) + "\": 1, ";
+    many += "\"b\": [";
+    for (int i = 0; i < 20000; ++i)
+        many += "{}, ";
+    const TemporaryFolder folder;
+    const auto begin = std::chrono::steady_clock::now();
+    EXPECT_TRUE(
+        says(refusal([&] { (void)read_camera_file(write_file(folder / "c.json", many + "{}]}")); }), "both missing"));
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20))
+        << "minutes, if all were copied for each";
 }
 
 TEST(CamerasOfOthersRefused, say_what_they_are_and_what_was_expected) {
