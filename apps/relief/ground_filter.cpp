@@ -32,12 +32,33 @@ cv::Mat1f without_gaps(const cv::Mat1f& lowest) {
     return filled;
 }
 
+/// Heights with at most two of the 24 cells around them as low, give or take false_depth_m(), become NaN: a ditch or
+/// the foot of a cliff goes on, a false return does not.
+cv::Mat1f without_false_returns(const cv::Mat1f& lowest) {
+    constexpr int reach = 2, most_as_low = 2, least_known = 8;
+    cv::Mat1f kept = lowest.clone();
+    for (int r = 0; r < lowest.rows; ++r)
+        for (int c = 0; c < lowest.cols; ++c) {
+            const cv::Rect around =
+                cv::Rect(c - reach, r - reach, 2 * reach + 1, 2 * reach + 1) & cv::Rect(0, 0, lowest.cols, lowest.rows);
+            int known = -1, as_low = -1; // itself
+            for (int y = around.y; y < around.br().y; ++y)
+                for (int x = around.x; x < around.br().x; ++x) {
+                    known += !std::isnan(lowest(y, x));
+                    as_low += lowest(y, x) < static_cast<double>(lowest(r, c)) + false_depth_m();
+                }
+            if (known >= least_known && as_low <= most_as_low)
+                kept(r, c) = std::nanf("");
+        }
+    return kept;
+}
+
 } // namespace
 
 cv::Mat1f opened_ground(const cv::Mat1f& lowest, double cell_m, double window_m) {
     constexpr double steepest = 1.0; // of terrain within a window
     constexpr double most_step_m = 2.5;
-    cv::Mat1f surface = without_gaps(lowest), ground = surface.clone();
+    cv::Mat1f surface = without_gaps(without_false_returns(lowest)), ground = surface.clone();
     const int last = std::max(1, static_cast<int>(window_m / cell_m / 2));
     for (int half = 1, before = 0;; half = std::min(2 * half, last)) {
         cv::Mat1f opened;

@@ -1,5 +1,6 @@
 #include "apps/relief/maps.h"
 
+#include "apps/relief/doubtful_heights.h"
 #include "apps/relief/svfs.h"
 #include "projection/base/memory.h"
 
@@ -237,6 +238,7 @@ std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, c
         if (row_of(layer).wanted)
             wanted.*row_of(layer).wanted = true;
     RowWindow window(raster);
+    DoubtfulHeights doubtful;
     std::int64_t known = 0;
     const int reach = reach_of(raster.grid.cell, walk, wanted);
     for (int first = 0; first < raster.size.height; first += band_rows) {
@@ -246,6 +248,7 @@ std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, c
         const cv::Range own(first - begin, last - begin);
         const cv::Mat1f z = field.z.rowRange(own);
         known += cv::countNonZero(measured_cells(z));
+        doubtful.add(z, raster.base);
         const Layers layers = layers_of(field, walk, wanted, own);
         for (const std::string& layer : settings.write)
             if (const MapRow& row = row_of(layer); row.layer)
@@ -258,6 +261,7 @@ std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, c
             take(views_folder + svfs_views()[i].name, first,
                  layers_of(field, of_sky(walk, svfs_views()[i].sky), {.svf = true}, own).svf);
     }
+    std::ranges::move(doubtful.notes(), std::back_inserter(raster.notes));
     return known;
 }
 

@@ -56,8 +56,8 @@ using Maps = std::vector<NamedMap>;
 using TakeRows = std::function<void(const std::string& layer, int first, const cv::Mat& rows)>;
 
 /// All maps, and views of svfs_views() by their names in front of ".tif", by bands of rows from the north; memory grows
-/// with the width of the raster alone. Values do not depend on `band_rows`. Returns how many cells have a height.
-/// Throws Error, Misuse.
+/// with the width of the raster alone. Values do not depend on `band_rows`. Returns how many cells have a height, and
+/// adds what is doubtful about heights to the reader's notes. Throws Error, Misuse.
 std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, const TakeRows& take,
                           int band_rows = 512);
 

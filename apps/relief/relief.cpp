@@ -161,9 +161,14 @@ class Relief final : public Command {
     void map(const std::string& name, const std::string& what, const Heights& heights, const Stopwatch& stopwatch,
              Maps* kept) {
         const rasters::RasterReader& rows = heights.rows;
-        for (const std::string& note : rows.notes)
-            fmt::print(stderr, "{}: {}\n", what, note);
+        std::size_t printed = 0;
+        const auto print_notes = [&] {
+            for (; printed < rows.notes.size(); ++printed)
+                fmt::print(stderr, "{}: {}\n", what, rows.notes[printed]);
+        };
+        print_notes();
         const Written written = write_maps(name, heights, settings_.maps, out_, kept);
+        print_notes();
         if (written.known == 0)
             fmt::print(stderr, "{}: no cell has a height: the maps are empty\n", what);
         if (!quiet_)

@@ -26,6 +26,19 @@ constexpr std::uint8_t ground = 2, key_point = 8, water = 9, road = 11;
 
 bool is_ground(std::uint8_t kind) { return kind == ground || kind == key_point || kind == water || kind == road; }
 
+/// Coordinates of the globe, in steps that only degrees need, and heights of another unit than x and y.
+bool probably_degrees(const Cloud& cloud, double step) {
+    constexpr double finest_m = 2e-6;
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& point : cloud.points)
+        if (point.allFinite())
+            box.extend(point);
+    if (box.isEmpty() || step == 0 || step > finest_m)
+        return false;
+    return box.min().x() >= -360 && box.max().x() <= 360 && box.min().y() >= -90 && box.max().y() <= 90 &&
+           box.sizes().z() > box.sizes().head<2>().maxCoeff();
+}
+
 void add(SurveyPoints& survey, const fs::path& file, bool first) {
     const Cloud cloud = read_cloud(file, survey.warnings);
     const std::string_view header = cloud.records ? std::string_view(cloud.records->header) : std::string_view();
@@ -34,7 +47,7 @@ void add(SurveyPoints& survey, const fs::path& file, bool first) {
         crs = during(file.string(), [&] { return rasters::crs_of_las(header); });
         survey.step = std::max({survey.step, std::abs(cloud.records->scale[0]), std::abs(cloud.records->scale[1])});
     }
-    if (crs.geographic)
+    if (crs.geographic || (!crs.known && probably_degrees(cloud, survey.step)))
         throw Error(file.string() +
                     ": coordinates are degrees, in which slopes mean nothing; project them first, such as "
                     "by PDAL's filters.reprojection");
@@ -92,8 +105,10 @@ Cells cells_of(const SurveyPoints& survey, double cell) {
     const double columns = std::max(std::ceil(box.max().x() / cell - cells.slack) - cells.column0, 1.0);
     const double rows = cells.row_end - cells.index(box.min().y());
     if (columns * rows > static_cast<double>(most_pixels))
-        throw Error(fmt::format("{:.0f} x {:.0f} cells, at most {} are computed; a larger --cell has fewer", columns,
-                                rows, most_pixels));
+        throw Error(fmt::format("{:.0f} x {:.0f} cells, at most {} are computed; a larger --cell has fewer. The points "
+                                "lie in x {:.1f} .. {:.1f}, y {:.1f} .. {:.1f}: one far from all others does the same",
+                                columns, rows, most_pixels, box.min().x(), box.max().x(), box.min().y(),
+                                box.max().y()));
     cells.size = {static_cast<int>(columns), static_cast<int>(rows)};
     return cells;
 }
@@ -116,8 +131,10 @@ Taken unclassified_ground(const SurveyPoints& survey, std::vector<std::string>& 
     const cv::Mat1f surface = opened_ground(lowest, least_cell_m, window_m);
     Taken taken(survey.points.size());
     for (std::size_t i = 0; i < survey.points.size(); ++i)
-        taken[i] = cells.find(survey.points[i], row, column) &&
-                   survey.points[i].z() * height_unit <= surface(row, column) + ground_tolerance_m();
+        if (cells.find(survey.points[i], row, column)) {
+            const double above = survey.points[i].z() * height_unit - surface(row, column);
+            taken[i] = above >= -false_depth_m() && above <= ground_tolerance_m();
+        }
     notes.push_back(
         fmt::format("No point is classified as ground: a progressive morphological filter with windows of up to {} "
                     "m decides, which is less certain.",
@@ -131,11 +148,19 @@ Taken points_taken(const SurveyPoints& survey, Surface surface, std::vector<std:
     Taken taken(survey.points.size());
     for (std::size_t i = 0; i < taken.size(); ++i)
         taken[i] = survey.points[i].allFinite() && (surface != Surface::ground || is_ground(survey.classes[i]));
+    for (std::size_t i = 0, begin = 0; i < survey.files.size(); begin = survey.ends[i++]) {
+        const auto first = taken.begin() + static_cast<std::ptrdiff_t>(begin),
+                   last = taken.begin() + static_cast<std::ptrdiff_t>(survey.ends[i]);
+        if (first != last && std::find(first, last, true) == last)
+            notes.push_back(fmt::format("No point of {} is classified as ground, while those of other files are: its "
+                                        "cells stay empty. Classify it, too, or choose another --surface.",
+                                        survey.files[i].string()));
+    }
     return taken;
 }
 
-/// 1, 2 or 5 times a power of ten, about as large as the mean spacing of points.
-double usual_cell_m(const SurveyPoints& survey, const Taken& taken) {
+/// As if the points of the surface lay in rows and columns.
+double spacing_m(const SurveyPoints& survey, const Taken& taken) {
     Eigen::AlignedBox2d box;
     double count = 0;
     for (std::size_t i = 0; i < taken.size(); ++i)
@@ -144,7 +169,11 @@ double usual_cell_m(const SurveyPoints& survey, const Taken& taken) {
             ++count;
         }
     const Eigen::Vector2d sides = box.sizes() * survey.crs.unit_m;
-    const double spacing = std::sqrt(std::max(sides.x() * sides.y(), 1e-6) / count);
+    return std::sqrt(std::max(sides.x() * sides.y(), 1e-6) / count);
+}
+
+/// 1, 2 or 5 times a power of ten, about as large as the spacing of points.
+double usual_cell_m(double spacing) {
     const double power = std::pow(10, std::floor(std::log10(spacing)));
     for (const double step : {1.0, 2.0, 5.0})
         if (spacing <= step * power * 1.0001)
@@ -202,9 +231,15 @@ SurfaceRaster surface_of(const SurveyPoints& survey, const SurfaceOptions& optio
     if (std::ranges::find(taken, true) == taken.end())
         throw Error("no point is of the surface that was asked for");
     double cell_m = options.cell_m;
+    const double spacing = spacing_m(survey, taken);
+    constexpr double fine = 3;
     if (cell_m == 0) {
-        cell_m = usual_cell_m(survey, taken);
+        cell_m = usual_cell_m(spacing);
         notes.push_back(fmt::format("Cells of {:.4g} m, about a point each; --cell sets another size.", cell_m));
+    } else if (fine * cell_m < spacing) {
+        notes.push_back(fmt::format("Points of the surface are {:.2g} m apart on average: most heights of cells of "
+                                    "{:.4g} m are interpolated, and show no relief of their own.",
+                                    spacing, cell_m));
     }
     const Cells cells = cells_of(survey, cell_m / survey.crs.unit_m);
     const auto first = static_cast<std::size_t>(std::ranges::find(taken, true) - taken.begin());

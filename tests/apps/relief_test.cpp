@@ -219,6 +219,54 @@ TEST(Relief, odd_rasters_have_values_where_they_have_heights) {
             << map.name;
 }
 
+/// A number for "no data" that the file does not declare is said, not guessed.
+TEST(Relief, undeclared_numbers_for_no_data_are_reported) {
+    const auto notes_of = [](float height, double base) {
+        rasters::Raster raster = made_raster({90, 60});
+        raster.z(cv::Rect(10, 10, 4, 5)).setTo(height - base);
+        raster.base = base;
+        rasters::MemoryReader reader(raster);
+        (void)maps_of({reader, {}}, {});
+        return reader.notes;
+    };
+    EXPECT_TRUE(tests::warned(notes_of(-9999, 0), "20 cells have a height of -9999"));
+    EXPECT_TRUE(tests::warned(notes_of(-32768, 0), "-32768"));
+    EXPECT_TRUE(tests::warned(notes_of(0, 0), "20 cells have a height of 0, all others"));
+    EXPECT_TRUE(notes_of(NAN, 0).empty());
+    EXPECT_TRUE(notes_of(280, 0).empty());
+    EXPECT_TRUE(tests::warned(notes_of(-9999, 290), "20 cells have a height of -9999"));
+    EXPECT_TRUE(tests::warned(notes_of(0, 290), "20 cells have a height of 0, all others"));
+}
+
+TEST(Relief, files_of_a_survey_without_classes_are_named) {
+    SurveyPoints survey = made_survey(true);
+    survey.files = {"east.las"}, survey.ends = {survey.points.size()};
+    EXPECT_TRUE(surface_of(survey, {.cell_m = 1}).raster.notes.empty());
+    survey.points.emplace_back(70, 30, 100);
+    survey.classes.push_back(1);
+    survey.files.emplace_back("west.las"), survey.ends.push_back(survey.points.size());
+    EXPECT_TRUE(tests::warned(surface_of(survey, {.cell_m = 1}).raster.notes, "No point of west.las is classified"));
+    EXPECT_TRUE(surface_of(survey, {.surface = Surface::all, .cell_m = 1}).raster.notes.empty());
+    EXPECT_TRUE(tests::warned(surface_of(survey, {.surface = Surface::all, .cell_m = 0.1}).raster.notes, "m apart"));
+}
+
+/// False returns far below the ground, unclassified: a point of a cell alone, and a ditch, which goes on.
+TEST(Relief, false_returns_below_the_ground_are_left_out_and_ditches_stay) {
+    SurveyPoints survey = made_survey(false);
+    for (const double x : {30.5, 50.5})
+        survey.points.emplace_back(x, 20.5, ground_at(x, 20.5) - 25), survey.classes.push_back(1);
+    for (Eigen::Vector3d& point : survey.points)
+        if (point.y() > 50 && point.y() < 52)
+            point.z() -= 4;
+    const SurfaceRaster surface = surface_of(survey, {.cell_m = 1});
+    const auto depth = [&](int x, int y) {
+        return surface.raster.z(59 - y, x) + surface.raster.base - ground_at(x + 0.5, y + 0.5);
+    };
+    EXPECT_NEAR(depth(30, 20), 0, 0.1);
+    EXPECT_NEAR(depth(50, 20), 0, 0.1);
+    EXPECT_NEAR(depth(30, 50), -4, 0.3);
+}
+
 tests::Ran run_relief(const std::string& words) { return tests::run_program("relief " + words); }
 
 fs::path made_dem(const fs::path& file) {
