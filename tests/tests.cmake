@@ -10,7 +10,7 @@ macro(leave_out test package)
 endmacro()
 
 # The developers' measurements: a program that is not installed.
-room(tests/bench apps_budget)
+room(tests/bench apps_budget apps_relief)
 add_executable(developers_bench tests/bench/main.cpp)
 target_link_libraries(developers_bench tests_bench)
 

@@ -10,6 +10,10 @@ namespace scanshade::relief {
 /// Cells that lie alone below their surroundings, as false returns do, have no height.
 [[nodiscard]] cv::Mat1f opened_ground(const cv::Mat1f& lowest, double cell_m, double window_m);
 
+/// Standard deviation of what the filter takes for ground and is not, metres: fitted (`developers_bench
+/// relief-errors`).
+[[nodiscard]] constexpr double filter_error_m() { return 0.05; }
+
 /// How far below its surroundings a cell is alone, and a point is none of the ground, metres.
 [[nodiscard]] constexpr double false_depth_m() { return 2.5; }
 

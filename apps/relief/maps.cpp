@@ -1,5 +1,6 @@
 #include "apps/relief/maps.h"
 
+#include "ao/horizon/view_error.h"
 #include "apps/relief/doubtful_heights.h"
 #include "apps/relief/svfs.h"
 #include "projection/base/memory.h"
@@ -36,6 +37,7 @@ const std::array map_rows = {
     MapRow{"openness-neg", 60, 95, true, &Layers::openness_neg, &Wanted::openness_neg},
     MapRow{"dominance", 0.5F, 1.8F, false, &Layers::dominance, &Wanted::dominance},
     MapRow{"ao", 0, 1, false, &Layers::ao, &Wanted::ao},
+    MapRow{"error"},
     MapRow{"dtm"},
     MapRow{"source"},
 };
@@ -60,6 +62,8 @@ std::string stem_of(const std::string& layer, const Settings& s, double radius) 
     const std::string walk = fmt::format("R{:.6g}_D{}", radius, s.directions);
     if (layer == "svf")
         return "SVF_" + walk;
+    if (layer == "error")
+        return "SVF_ERROR_" + walk;
     if (layer == "asvf")
         return fmt::format("SVF-A_{}_A{:g}_AL{}", walk, s.azimuth, s.anisotropy == Anisotropy::low ? "low" : "high");
     if (layer == "openness")
@@ -84,6 +88,8 @@ std::string description_of(const std::string& layer, const Settings& s) {
     const std::string rvt = s.profile == Profile::rvt ? " as RVT computes it" : "";
     if (layer == "svf")
         return "sky-view factor, " + definition_word(s.definition) + rvt;
+    if (layer == "error")
+        return "expected RMSE of the sky-view factor, " + definition_word(s.definition) + rvt;
     if (layer == "asvf")
         return fmt::format("anisotropic sky-view factor, solid angle, brightest at {:g} degrees {} from north{}",
                            s.azimuth, s.profile == Profile::rvt ? "counterclockwise" : "clockwise", rvt);
@@ -102,7 +108,7 @@ rasters::RasterText text_of(const std::string& layer, const Settings& s) {
     rasters::RasterText text{description_of(layer, s), {{"SOFTWARE", "scanshade " SCANSHADE_VERSION}}};
     if (layer == "dtm" || layer == "source")
         return text;
-    if (layer == "svf")
+    if (layer == "svf" || layer == "error")
         text.items.emplace_back("SVF_DEFINITION", definition_word(s.definition));
     text.items.emplace_back("PROFILE", s.profile == Profile::rvt ? "rvt" : "exact");
     if (layer != "dominance")
@@ -154,6 +160,27 @@ void put(Maps& maps, const std::string& layer, int first, const cv::Mat& rows) {
     rows.copyTo(std::ranges::find(maps, layer, &NamedMap::name)->values.rowRange(first, first + rows.rows));
 }
 
+/// Standard deviation of a raster's heights, in the file's unit: as it is set, and by their rounding.
+double sigma_of(const rasters::RasterReader& raster, double noise_m) {
+    constexpr double alike = 0.75; // roundings of neighbours are: fitted (`developers_bench relief-errors`)
+    const double rounding = alike * raster.step / std::sqrt(12.0);
+    return std::hypot(noise_m / raster.grid.crs.height_unit_m, rounding);
+}
+
+/// Errors of heights in rows of the raster: those of a survey, or drawn.
+cv::Mat1f errors_of(const Heights& heights, double sigma, cv::Range rows) {
+    if (!heights.errors.empty())
+        return heights.errors.rowRange(rows);
+    if (sigma == 0)
+        return {};
+    constexpr unsigned stream = 5;
+    cv::Mat1f errors(rows.size(), heights.rows.size.width);
+    for (int r = 0; r < errors.rows; ++r)
+        for (int c = 0; c < errors.cols; ++c)
+            errors(r, c) = static_cast<float>(sigma) * horizon::drawn_error(rows.start + r, c, 0, stream);
+    return errors;
+}
+
 /// The rows of a raster that a band needs, each read once.
 class RowWindow {
   public:
@@ -199,7 +226,7 @@ Settings in_units_of(const rasters::Grid& grid, const Settings& settings) {
 
 std::string map_file_name(const std::string& name, const std::string& layer, const Settings& settings,
                           double radius_cells, bool bytes) {
-    const bool walks = row_of(layer).layer != nullptr && layer != "dominance" && layer != "ao";
+    const bool walks = layer == "error" || (row_of(layer).layer != nullptr && layer != "dominance" && layer != "ao");
     return name + "_" + stem_of(layer, settings, radius_cells) + (walks ? noise_suffix(layer, settings.noise) : "") +
            (bytes ? "_8bit" : "") + ".tif";
 }
@@ -240,7 +267,10 @@ std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, c
     RowWindow window(raster);
     DoubtfulHeights doubtful;
     std::int64_t known = 0;
-    const int reach = reach_of(raster.grid.cell, walk, wanted);
+    const bool error = std::ranges::find(settings.write, "error") != settings.write.end();
+    const double sigma = sigma_of(raster, settings.height_noise_m);
+    const int reach =
+        std::max(reach_of(raster.grid.cell, walk, wanted), error ? error_reach_of(raster.grid.cell, walk) : 0);
     for (int first = 0; first < raster.size.height; first += band_rows) {
         const int last = std::min(first + band_rows, raster.size.height);
         const int begin = std::max(first - reach, 0), end = std::min(last + reach, raster.size.height);
@@ -253,6 +283,8 @@ std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, c
         for (const std::string& layer : settings.write)
             if (const MapRow& row = row_of(layer); row.layer)
                 take(layer, first, layers.*row.layer);
+            else if (layer == "error")
+                take(layer, first, svf_error_of(field, walk, errors_of(heights, sigma, {begin, end}), own, begin));
             else if (layer == "dtm")
                 take(layer, first, raster.base == 0 ? cv::Mat(z) : cv::Mat(z + raster.base));
             else

@@ -18,9 +18,10 @@ struct MapSettings {
     std::vector<std::string> write{"svf"}; ///< names of map_names()
     bool bytes = false;                    ///< each also with 8 bits, stretched
     bool svfs = false;                     ///< svfs.zip, too
+    double height_noise_m = 0;             ///< standard deviation of heights, for `error`; of surveys it is measured
 };
 
-/// What `write` may hold: svf, asvf, openness, openness-neg, dominance, ao, dtm, source.
+/// What `write` may hold: svf, asvf, openness, openness-neg, dominance, ao, error, dtm, source.
 [[nodiscard]] const std::vector<std::string>& map_names();
 
 /// The settings in the raster's own unit: distances divided by that of the plane, heights brought to it by the
@@ -42,7 +43,8 @@ struct MapSettings {
 /// What maps are made of.
 struct Heights {
     rasters::RasterReader& rows;
-    cv::Mat1b source; ///< of each cell; empty where the input is a raster
+    cv::Mat1b source{}; ///< of each cell; empty where the input is a raster
+    cv::Mat1f errors{}; ///< a draw of the errors of heights, in their unit; empty where the input is a raster
 };
 
 /// A map of `write` and its values: floats, `source` bytes.

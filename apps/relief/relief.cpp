@@ -127,7 +127,10 @@ class Relief final : public Command {
             fmt::print(stderr, "{}\n", warning);
         const std::string what =
             files.size() == 1 ? files.front().string() : fmt::format("{} files of points", files.size());
-        const SurfaceRaster surface = during(what, [&] { return surface_of(survey, settings_.surface); });
+        SurfaceOptions options = settings_.surface;
+        options.errors = std::ranges::find(settings_.maps.write, "error") != settings_.maps.write.end();
+        options.height_noise_m = settings_.maps.height_noise_m;
+        const SurfaceRaster surface = during(what, [&] { return surface_of(survey, options); });
         // Many files are named by their folder.
         const std::string name =
             files.size() == 1 ? name_of(files.front()) : name_of(fs::absolute(files.front()).parent_path());
@@ -138,7 +141,7 @@ class Relief final : public Command {
             claim(map_files(name, heights.grid, settings_.maps, out_));
             if (settings_.points)
                 claim(point_files(survey, out_));
-            map(name, what, {heights, surface.source}, stopwatch, settings_.points ? &maps : nullptr);
+            map(name, what, {heights, surface.source, surface.errors}, stopwatch, settings_.points ? &maps : nullptr);
         });
         if (!settings_.points)
             return;

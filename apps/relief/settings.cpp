@@ -80,6 +80,12 @@ std::vector<Stage> ReliefSettings::stages() {
               {.name = "noise",
                .help = "leaves out the nearest 0, 10, 20 or 40 % of the radius",
                .value = OneOf(&walk.noise, noise_words)},
+              {.name = "height-noise",
+               .help = "sigma of heights, for expected errors; 0: the rounding of rasters, and what points of a cell "
+                       "differ by",
+               .value = &maps.height_noise_m,
+               .unit = "m",
+               .low = 0},
               {.name = "exaggeration",
                .help = "factor of heights",
                .value = &walk.exaggeration,

@@ -1,6 +1,7 @@
 #include "apps/relief/surface.h"
 
 #include "ao/horizon/horizon.h"
+#include "ao/horizon/view_error.h"
 #include "apps/relief/ground_filter.h"
 #include "apps/relief/triangles.h"
 #include "io/clouds/cloud_file.h"
@@ -10,6 +11,7 @@
 #include "io/rasters/las_crs.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -84,6 +86,16 @@ struct Cells {
         // Points on the outer border belong to the last cells.
         row = std::max(static_cast<int>(y), 0), column = std::min(static_cast<int>(x), size.width - 1);
         return true;
+    }
+    [[nodiscard]] std::size_t number(int row, int column) const {
+        return static_cast<std::size_t>(row) * static_cast<std::size_t>(size.width) + static_cast<std::size_t>(column);
+    }
+    /// Row and column on the map, the same in all pieces of it.
+    [[nodiscard]] std::pair<int, int> place(int number) const {
+        const auto wrapped = [](double value) {
+            return static_cast<int>(static_cast<std::int64_t>(value) & 0x3fffffff);
+        };
+        return {wrapped(-row_end + number / size.width), wrapped(column0 + number % size.width)};
     }
     /// Cells are half-open; coordinates on a line, give or take their rounding, belong to the north-east.
     [[nodiscard]] double index(double coordinate) const { return std::floor(coordinate / cell + slack); }
@@ -181,12 +193,13 @@ double usual_cell_m(double spacing) {
     return 10 * power;
 }
 
-/// What lies in each cell: a vertex of the surface, in cells from the raster's corner.
-std::vector<Vertex> vertices_of(const SurveyPoints& survey, const Taken& taken, const Cells& cells, Surface surface,
-                                double base) {
-    struct Sum {
-        double x = 0, y = 0, z = 0, count = 0;
-    };
+/// The points of a cell.
+struct Sum {
+    double x = 0, y = 0, z = 0, count = 0;
+};
+
+std::vector<Sum> sums_of(const SurveyPoints& survey, const Taken& taken, const Cells& cells, Surface surface,
+                         double base) {
     require_memory(static_cast<std::uint64_t>(cells.size.area()) * sizeof(Sum), "a grid of cells");
     std::vector<Sum> sums(static_cast<std::size_t>(cells.size.area()));
     int row = 0, column = 0;
@@ -194,8 +207,7 @@ std::vector<Vertex> vertices_of(const SurveyPoints& survey, const Taken& taken, 
         const Eigen::Vector3d& point = survey.points[i];
         if (!taken[i] || !cells.find(point, row, column))
             continue;
-        Sum& sum = sums[static_cast<std::size_t>(row) * static_cast<std::size_t>(cells.size.width) +
-                        static_cast<std::size_t>(column)];
+        Sum& sum = sums[cells.number(row, column)];
         const double z = point.z() - base;
         if (surface == Surface::top) {
             sum.z = sum.count == 0 ? z : std::max(sum.z, z);
@@ -205,11 +217,134 @@ std::vector<Vertex> vertices_of(const SurveyPoints& survey, const Taken& taken, 
         sum.x += point.x() / cells.cell - cells.column0, sum.y += cells.row_end - point.y() / cells.cell;
         sum.z += z, sum.count += 1;
     }
+    return sums;
+}
+
+/// What lies in each cell: a vertex of the surface, in cells from the raster's corner.
+std::vector<Vertex> vertices_of(const std::vector<Sum>& sums) {
     std::vector<Vertex> vertices;
     for (std::size_t i = 0; i < sums.size(); ++i)
         if (const Sum& sum = sums[i]; sum.count > 0)
             vertices.push_back({sum.x / sum.count, sum.y / sum.count, sum.z / sum.count, static_cast<int>(i)});
     return vertices;
+}
+
+/// The size that was asked for, or a usual one.
+double cell_size_m(double cell_m, double spacing, std::vector<std::string>& notes) {
+    constexpr double fine = 3;
+    if (cell_m == 0) {
+        cell_m = usual_cell_m(spacing);
+        notes.push_back(fmt::format("Cells of {:.4g} m, about a point each; --cell sets another size.", cell_m));
+    } else if (fine * cell_m < spacing) {
+        notes.push_back(fmt::format("Points of the surface are {:.2g} m apart on average: most heights of cells of "
+                                    "{:.4g} m are interpolated, and show no relief of their own.",
+                                    spacing, cell_m));
+    }
+    return cell_m;
+}
+
+/// Cells farther than `fill` from the nearest measured one lose their height.
+cv::Mat1b source_of(cv::Mat1f& z, const cv::Mat1f& distance, double fill) {
+    cv::Mat1b sources(z.size());
+    for (int r = 0; r < z.rows; ++r)
+        for (int c = 0; c < z.cols; ++c) {
+            if (distance(r, c) > fill)
+                z(r, c) = std::nanf("");
+            const Source source = std::isnan(z(r, c))   ? Source::nothing
+                                  : distance(r, c) == 0 ? Source::measured
+                                                        : Source::interpolated;
+            sources(r, c) = static_cast<std::uint8_t>(source);
+        }
+    return sources;
+}
+
+/// Standard deviation of one point's height in the unit of heights: what points of a cell differ by, but for the slope.
+double point_noise(const SurveyPoints& survey, const Taken& taken, const Cells& cells, const std::vector<Sum>& sums,
+                   double base) {
+    cv::Mat1f means(cells.size, std::nanf(""));
+    for (std::size_t i = 0; i < sums.size(); ++i)
+        if (sums[i].count > 0)
+            means(static_cast<int>(i) / means.cols, static_cast<int>(i) % means.cols) =
+                static_cast<float>(sums[i].z / sums[i].count);
+    const horizon::Slopes slopes = horizon::slopes_of({means, 1});
+    std::vector<float> residuals;
+    int row = 0, column = 0;
+    for (std::size_t i = 0; i < taken.size(); ++i) {
+        const Eigen::Vector3d& point = survey.points[i];
+        if (!taken[i] || !cells.find(point, row, column))
+            continue;
+        const Sum& sum = sums[cells.number(row, column)];
+        if (sum.count < 2)
+            continue;
+        const double east = point.x() / cells.cell - cells.column0 - sum.x / sum.count,
+                     north = sum.y / sum.count - (cells.row_end - point.y() / cells.cell),
+                     above = point.z() - base - sum.z / sum.count - slopes.east(row, column) * east -
+                             slopes.north(row, column) * north;
+        residuals.push_back(static_cast<float>(std::abs(above) * std::sqrt(sum.count / (sum.count - 1))));
+    }
+    constexpr std::size_t least = 30;
+    return residuals.size() < least ? std::nan("") : median(std::move(residuals)) / median_of_gaussian;
+}
+
+/// The same as it is set or measured, larger where a filter decides what is ground.
+double vertex_noise(const SurveyPoints& survey, const Taken& taken, const Cells& cells, const std::vector<Sum>& sums,
+                    double base, const SurfaceOptions& options, std::vector<std::string>& notes) {
+    const double unit = survey.crs.height_unit_m;
+    double noise = options.height_noise_m / unit;
+    if (noise == 0) {
+        constexpr double usual_m = 0.03; // of airborne lidar on hard ground
+        // The highest points have no mean to differ from.
+        noise = options.surface == Surface::top ? std::nan("") : point_noise(survey, taken, cells, sums, base);
+        notes.push_back(std::isnan(noise)
+                            ? fmt::format("Too few cells have two points of the surface to tell their noise: {} m is "
+                                          "assumed for expected errors; --height-noise sets it.",
+                                          usual_m)
+                            : fmt::format("Points of the surface have a noise of {:.2g} m.", noise * unit));
+        noise = std::isnan(noise) ? usual_m / unit : noise;
+    }
+    const bool filtered = options.surface == Surface::ground && !survey.ground_classified;
+    return filtered ? std::hypot(noise, filter_error_m() / unit) : noise;
+}
+
+/// Errors of vertices by their cells' places on the map.
+void draw_errors(std::vector<Vertex>& vertices, const std::vector<Sum>& sums, double noise, const Cells& cells) {
+    constexpr unsigned stream = 3;
+    for (Vertex& vertex : vertices) {
+        const auto [row, column] = cells.place(vertex.cell);
+        const double count = sums[static_cast<std::size_t>(vertex.cell)].count;
+        vertex.error = static_cast<float>(noise / std::sqrt(count)) * horizon::drawn_error(row, column, 0, stream);
+    }
+}
+
+/// Between points the surface bends as it does where it is known: by the bend of one cell, times a power of the
+/// distance.
+void add_errors_of_gaps(cv::Mat1f& errors, const cv::Mat1f& z, const cv::Mat1f& distance, const Cells& cells) {
+    constexpr float factor = 0.45F, power = 1.2F, steepest = 0.4F; // fitted (`developers_bench relief-errors`)
+    constexpr int around = 12;
+    constexpr unsigned stream = 41;
+    cv::Mat1f bends = horizon::bend_of(z), own = horizon::bend_of(errors);
+    // Walls bend more, and end.
+    const auto most = static_cast<float>(steepest * steepest * cells.cell * cells.cell);
+    double sum = 0, count = 0;
+    for (int r = 0; r < z.rows; ++r)
+        for (int c = 0; c < z.cols; ++c) {
+            const float square = bends(r, c) * bends(r, c) - own(r, c) * own(r, c);
+            bends(r, c) = distance(r, c) > 0 ? std::nanf("") : std::min(square, most);
+            if (!std::isnan(bends(r, c)))
+                sum += bends(r, c), count += 1;
+        }
+    const auto usual = static_cast<float>(count > 0 ? sum / count : 0);
+    const cv::Mat1f means = horizon::mean_of_known(bends, around);
+    for (int r = 0; r < z.rows; ++r)
+        for (int c = 0; c < z.cols; ++c) {
+            const float d = distance(r, c), mean = std::isnan(means(r, c)) ? usual : means(r, c);
+            if (d == 0 || !(mean > 0))
+                continue;
+            const auto [row, column] = cells.place(r * z.cols + c);
+            const int octave = std::clamp(static_cast<int>(std::lround(std::log2(d))), 0, 16);
+            errors(r, c) +=
+                factor * std::sqrt(mean) * std::pow(d, power) * horizon::drawn_error(row, column, octave, stream);
+        }
 }
 
 } // namespace
@@ -230,50 +365,41 @@ SurfaceRaster surface_of(const SurveyPoints& survey, const SurfaceOptions& optio
     const Taken taken = points_taken(survey, options.surface, notes);
     if (std::ranges::find(taken, true) == taken.end())
         throw Error("no point is of the surface that was asked for");
-    double cell_m = options.cell_m;
-    const double spacing = spacing_m(survey, taken);
-    constexpr double fine = 3;
-    if (cell_m == 0) {
-        cell_m = usual_cell_m(spacing);
-        notes.push_back(fmt::format("Cells of {:.4g} m, about a point each; --cell sets another size.", cell_m));
-    } else if (fine * cell_m < spacing) {
-        notes.push_back(fmt::format("Points of the surface are {:.2g} m apart on average: most heights of cells of "
-                                    "{:.4g} m are interpolated, and show no relief of their own.",
-                                    spacing, cell_m));
-    }
+    const double cell_m = cell_size_m(options.cell_m, spacing_m(survey, taken), notes);
     const Cells cells = cells_of(survey, cell_m / survey.crs.unit_m);
     const auto first = static_cast<std::size_t>(std::ranges::find(taken, true) - taken.begin());
     const double base = std::floor(survey.points[first].z());
-    const std::vector<Vertex> vertices = vertices_of(survey, taken, cells, options.surface, base);
-    rasters::Grid grid;
+    const std::vector<Sum> sums = sums_of(survey, taken, cells, options.surface, base);
+    std::vector<Vertex> vertices = vertices_of(sums);
+    if (options.errors)
+        draw_errors(vertices, sums, vertex_noise(survey, taken, cells, sums, base, options, notes), cells);
+    rasters::Grid& grid = result.raster.grid;
     grid.cell = cells.cell, grid.x0 = cells.column0 * cells.cell, grid.y0 = cells.row_end * cells.cell;
     grid.crs = survey.crs;
     cv::Mat1b unmeasured(cells.size, std::uint8_t(255));
     for (const Vertex& vertex : vertices)
         unmeasured(vertex.cell / cells.size.width, vertex.cell % cells.size.width) = 0;
-    cv::Mat1f z = options.surface == Surface::ground || cv::countNonZero(unmeasured) > 0
-                      ? heights_at_centres(vertices, cells.size)
-                      : cv::Mat1f(cells.size, std::nanf(""));
+    cv::Mat1f* errors = options.errors ? &result.errors : nullptr;
+    const bool between = options.surface == Surface::ground || cv::countNonZero(unmeasured) > 0;
+    cv::Mat1f z = between ? heights_at_centres(vertices, cells.size, errors) : cv::Mat1f(cells.size, std::nanf(""));
+    if (errors && !between)
+        *errors = cv::Mat1f(cells.size, 0.0F);
     // A highest point and a mean are a cell's own; so is ground outside all triangles.
     for (const Vertex& vertex : vertices) {
-        float& height = z(vertex.cell / cells.size.width, vertex.cell % cells.size.width);
-        if (options.surface != Surface::ground || std::isnan(height))
-            height = static_cast<float>(vertex.z);
+        const cv::Point at(vertex.cell % cells.size.width, vertex.cell / cells.size.width);
+        if (options.surface != Surface::ground || std::isnan(z(at))) {
+            z(at) = static_cast<float>(vertex.z);
+            if (errors)
+                (*errors)(at) = vertex.error;
+        }
     }
     cv::Mat1f distance; // in cells, from the nearest measured one
     cv::distanceTransform(unmeasured, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+    if (errors)
+        add_errors_of_gaps(*errors, z, distance, cells);
     const double fill = options.fill_m > 0 ? options.fill_m / cell_m : std::max(3 / cell_m, 6.0);
-    result.source.create(cells.size);
-    for (int r = 0; r < z.rows; ++r)
-        for (int c = 0; c < z.cols; ++c) {
-            if (distance(r, c) > fill)
-                z(r, c) = std::nanf("");
-            const Source source = std::isnan(z(r, c))     ? Source::nothing
-                                  : unmeasured(r, c) == 0 ? Source::measured
-                                                          : Source::interpolated;
-            result.source(r, c) = static_cast<std::uint8_t>(source);
-        }
-    result.raster.z = z, result.raster.base = base, result.raster.grid = grid;
+    result.source = source_of(z, distance, fill);
+    result.raster.z = z, result.raster.base = base;
     return result;
 }
 

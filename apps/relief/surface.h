@@ -38,13 +38,16 @@ enum class Source : std::uint8_t { nothing = 0, measured = 1, interpolated = 2 }
 
 struct SurfaceRaster {
     rasters::Raster raster;
-    cv::Mat1b source; ///< Source of each cell
+    cv::Mat1b source;   ///< Source of each cell
+    cv::Mat1f errors{}; ///< a draw of the heights' errors, in their unit; empty unless asked for
 };
 
 struct SurfaceOptions {
     Surface surface = Surface::ground;
-    double cell_m = 0; ///< 0: about a point of the surface a cell
-    double fill_m = 0; ///< how far a cell may be from the nearest measured one; 0: 3 m or 6 cells, the larger
+    double cell_m = 0;         ///< 0: about a point of the surface a cell
+    double fill_m = 0;         ///< how far a cell may be from the nearest measured one; 0: 3 m or 6 cells, the larger
+    bool errors = false;       ///< what is believed of them, too
+    double height_noise_m = 0; ///< standard deviation of a point's height; 0: as points of one cell differ
 };
 
 /// Corners lie on multiples of the cell. Ground is a mean of points in a cell, read at the cell's centre from triangles

@@ -11,8 +11,8 @@ namespace {
 
 using Triangle = std::array<const Vertex*, 3>;
 
-/// Writes the plane of a triangle to the centres that it holds, its edges included.
-void draw(const Triangle& triangle, cv::Mat1f& z) {
+/// Writes the plane of a triangle, and that of its errors, to the centres that it holds, its edges included.
+void draw(const Triangle& triangle, cv::Mat1f& z, cv::Mat1f* errors) {
     const auto& [a, b, c] = triangle;
     const double area = (b->x - a->x) * (c->y - a->y) - (c->x - a->x) * (b->y - a->y);
     if (area == 0)
@@ -29,15 +29,21 @@ void draw(const Triangle& triangle, cv::Mat1f& z) {
             const double x = column + 0.5, y = row + 0.5;
             const double u = ((x - a->x) * (c->y - a->y) - (c->x - a->x) * (y - a->y)) / area;
             const double v = ((b->x - a->x) * (y - a->y) - (x - a->x) * (b->y - a->y)) / area;
-            if (u >= slack && v >= slack && u + v <= 1 - slack)
+            if (u >= slack && v >= slack && u + v <= 1 - slack) {
                 z(row, column) = static_cast<float>(a->z + u * (b->z - a->z) + v * (c->z - a->z));
+                if (errors)
+                    (*errors)(row, column) =
+                        static_cast<float>(a->error + u * (b->error - a->error) + v * (c->error - a->error));
+            }
         }
 }
 
 } // namespace
 
-cv::Mat1f heights_at_centres(const std::vector<Vertex>& vertices, cv::Size size) {
+cv::Mat1f heights_at_centres(const std::vector<Vertex>& vertices, cv::Size size, cv::Mat1f* errors) {
     cv::Mat1f z(size, std::nanf(""));
+    if (errors)
+        *errors = cv::Mat1f(size, 0.0F);
     cv::Subdiv2D subdivision(cv::Rect(0, 0, size.width + 1, size.height + 1));
     std::vector<const Vertex*> vertex_of; // by OpenCV's number
     const auto insert = [&](const Vertex& vertex) {
@@ -69,7 +75,7 @@ cv::Mat1f heights_at_centres(const std::vector<Vertex>& vertices, cv::Size size)
             edge = subdivision.getEdge(edge, cv::Subdiv2D::NEXT_AROUND_LEFT);
         }
         if (ours)
-            draw(triangle, z);
+            draw(triangle, z, errors);
     }
     return z;
 }

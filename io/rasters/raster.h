@@ -40,6 +40,7 @@ class RasterReader {
 
     cv::Size size;
     double base = 0;     ///< as of Raster
+    double step = 0;     ///< heights are rounded to multiples of it; 0: not known to be
     bool scaled = false; ///< heights are the file's numbers times its SCALE plus OFFSET
     Grid grid;
     std::vector<std::string> notes;

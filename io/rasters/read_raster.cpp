@@ -419,6 +419,8 @@ class TiffReader final : public RasterReader {
         grid = grid_of(tiff_, size, notes);
         take_height_unit(grid.crs, scaling_.unit, notes);
         scaled = scaling_.any();
+        if (layout_.format != SAMPLEFORMAT_IEEEFP)
+            step = std::abs(scaling_.scale);
         mask_ = Mask::find(file, size);
         if (needs_base(layout_, scaling_))
             find_base();

@@ -105,6 +105,7 @@ class VrtReader final : public RasterReader {
             const std::unique_ptr<RasterReader> part = opened(sources_[i]);
             if (i == 0)
                 base = part->base;
+            step = std::max(step, part->step);
             if (changed && !part->scaled)
                 refuse(file_, fmt::format("its band has a scale that source {} does not have, which is not read; "
                                           "`gdal_translate -unscale` makes a raster of heights",

@@ -1,6 +1,7 @@
 // Height fields beside the outputs of the Relief Visualization Toolbox, and dense rays: the folder relief beside the
 // one that SCANSHADE_FIXTURES names.
 #include "ao/horizon/horizon.h"
+#include "ao/horizon/view_error.h"
 #include "apps/relief/maps.h"
 #include "apps/relief/surface.h"
 #include "io/rasters/raster.h"
@@ -225,7 +226,8 @@ TEST(ReliefReference, ground_of_points_is_the_true_ground) {
         for (const std::string file : row.at("cloud"))
             files.push_back(fixtures() / file);
         const relief::SurveyPoints survey = relief::read_survey(files);
-        const relief::SurfaceRaster surface = relief::surface_of(survey, {.cell_m = row.at("cell").get<double>()});
+        const relief::SurfaceRaster surface =
+            relief::surface_of(survey, {.cell_m = row.at("cell").get<double>(), .errors = true});
         const fs::path truth = fixtures() / row.at("reference");
         const rasters::Raster dtm = rasters::read_raster(truth, 1);
         const rasters::Grid& grid = surface.raster.grid;
@@ -246,17 +248,27 @@ TEST(ReliefReference, ground_of_points_is_the_true_ground) {
         settings.directions = 32;
         const horizon::Layers layers = horizon::layers_of(
             {surface.raster.z, grid.cell}, relief::in_units_of(grid, settings), {.svf = true, .ao = true});
+        const auto outside_holes_rms = [&](const cv::Mat1f& error) {
+            cv::Mat1f zero(error.size(), 0.0F);
+            zero.setTo(NAN, mask != 0);
+            return difference(error, zero, margin).rmse;
+        };
         const auto outside_holes = [&](const cv::Mat1f& map, int band) {
             cv::Mat1f reference = rasters::read_raster(truth, band).z;
             reference.setTo(NAN, mask != 0);
             return difference(map, reference, margin);
         };
+        const cv::Mat1f error =
+            horizon::svf_error_of({surface.raster.z, grid.cell}, relief::in_units_of(grid, settings), surface.errors,
+                                  {0, surface.raster.z.rows});
+        const double expected = outside_holes_rms(error);
         const Difference svf = outside_holes(layers.svf, 2), ao = outside_holes(layers.ao, 9);
         if (std::getenv("RELIEF_TABLE"))
-            fmt::print("{}: heights {:.4f} m (bias {:+.4f}), svf {:.4f}, ao {:.4f}\n",
-                       row.at("name").get<std::string>(), height.rmse, height.bias, svf.rmse, ao.rmse);
+            fmt::print("{}: heights {:.4f} m (bias {:+.4f}), svf {:.4f} (expected {:.4f}), ao {:.4f}\n",
+                       row.at("name").get<std::string>(), height.rmse, height.bias, svf.rmse, expected, ao.rmse);
         const bool classed = row.at("classed");
         EXPECT_LT(height.rmse, classed ? 0.03 : 0.06) << row.at("name");
+        EXPECT_NEAR(svf.rmse / expected, 1, 0.25) << row.at("name");
         EXPECT_LT(svf.rmse, classed ? 0.017 : 0.045) << row.at("name");
         EXPECT_LT(ao.rmse, classed ? 0.005 : 0.04) << row.at("name");
     }

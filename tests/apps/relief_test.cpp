@@ -163,7 +163,8 @@ rasters::Raster made_raster(cv::Size size) {
 TEST(Relief, bands_have_the_bits_of_one_piece) {
     const rasters::Raster raster = made_raster({300, 130});
     MapSettings settings;
-    settings.write = {"svf", "asvf", "openness", "openness-neg", "dominance", "ao", "dtm", "source"};
+    settings.write = {"svf", "asvf", "openness", "openness-neg", "dominance", "ao", "dtm", "source", "error"};
+    settings.height_noise_m = 0.02;
     settings.walk.radius = 7.5;
     settings.walk.directions = 8;
     for (const horizon::Profile profile : {horizon::Profile::exact, horizon::Profile::rvt}) {
@@ -188,7 +189,7 @@ TEST(Relief, bands_have_the_bits_of_one_piece) {
                 },
                 rows);
             EXPECT_EQ(differ, 0U) << rows;
-            EXPECT_EQ(seen, static_cast<std::size_t>((130 + rows - 1) / rows) * 8) << rows;
+            EXPECT_EQ(seen, static_cast<std::size_t>((130 + rows - 1) / rows) * 9) << rows;
         }
     }
 }
@@ -196,7 +197,7 @@ TEST(Relief, bands_have_the_bits_of_one_piece) {
 /// One cell wide, one cell alone, no height at all, cells of a millimetre and of a kilometre.
 TEST(Relief, odd_rasters_have_values_where_they_have_heights) {
     MapSettings settings;
-    settings.write = {"svf", "openness", "dominance", "ao", "source"};
+    settings.write = {"svf", "openness", "dominance", "ao", "error", "source"};
     for (const horizon::Profile profile : {horizon::Profile::exact, horizon::Profile::rvt})
         for (const cv::Size size : {cv::Size(1, 1), cv::Size(1, 90), cv::Size(90, 1), cv::Size(37, 53)})
             for (const double cell : {0.001, 1.0, 1000.0}) {
@@ -265,6 +266,38 @@ TEST(Relief, false_returns_below_the_ground_are_left_out_and_ditches_stay) {
     EXPECT_NEAR(depth(30, 20), 0, 0.1);
     EXPECT_NEAR(depth(50, 20), 0, 0.1);
     EXPECT_NEAR(depth(30, 50), -4, 0.3);
+}
+
+/// More noise, more error; none of it where nothing is seen. A survey knows its noise itself.
+TEST(Relief, expected_errors_grow_with_noise_and_near_gaps) {
+    const auto errors_with = [](double noise_m) {
+        rasters::Raster raster = made_raster({100, 100});
+        for (int r = 0; r < 100; ++r)
+            for (int c = 0; c < 100; ++c)
+                raster.z(r, c) = static_cast<float>(std::sin(r * 0.3)) + 0 * raster.z(r, c); // NaN stays
+        rasters::MemoryReader reader(raster);
+        MapSettings settings;
+        settings.write = {"error"};
+        settings.height_noise_m = noise_m;
+        return cv::Mat1f(maps_of({reader}, settings)[0].values);
+    };
+    const cv::Mat1f exact = errors_with(0), noisy = errors_with(0.1);
+    EXPECT_TRUE(std::isnan(noisy(41, 31)));
+    EXPECT_GT(noisy(70, 70), 1.2 * exact(70, 70));
+    EXPECT_GT(exact(50, 0), exact(50, 50)); // half of its surroundings are beyond the border
+
+    SurveyPoints survey = made_survey(true);
+    std::mt19937 random(5);
+    std::normal_distribution<double> normal(0, 0.07);
+    for (Eigen::Vector3d& point : survey.points)
+        point.z() += normal(random);
+    const SurfaceRaster surface = surface_of(survey, {.cell_m = 1, .fill_m = 8, .errors = true});
+    EXPECT_TRUE(tests::warned(surface.raster.notes, "a noise of 0.07"));
+    double sum = 0;
+    for (int r = 40; r < 60; ++r) // no gap, no tree
+        for (int c = 0; c < 30; ++c)
+            sum += surface.errors(r - 40, c) * surface.errors(r - 40, c);
+    EXPECT_NEAR(std::sqrt(sum / 600), 0.07 / 2, 0.01); // four points a cell
 }
 
 tests::Ran run_relief(const std::string& words) { return tests::run_program("relief " + words); }

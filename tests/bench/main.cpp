@@ -27,6 +27,7 @@ const std::array parts = {
                hard_cases_part},
     CommandRow{"normals", "degrees between normals and truth for each sensor; exit 2 where an aim is missed",
                normals_part},
+    CommandRow{"relief-errors", "errors of sky view of generated terrain, expected and found", relief_errors_part},
     CommandRow{"sides", "what tells the scanned sides of clouds from the others; one JSON line each", sides_part},
 };
 

@@ -40,5 +40,6 @@ std::unique_ptr<Command> flatness_part();
 std::unique_ptr<Command> hard_cases_part();
 std::unique_ptr<Command> normals_part();
 std::unique_ptr<Command> sides_part();
+std::unique_ptr<Command> relief_errors_part();
 
 } // namespace scanshade::bench

@@ -522,7 +522,8 @@ def relief(
               Or the path of a GeoTIFF or .vrt, which has its own units and place
     cell:     side of a cell in metres; None for a path
     write:    names of maps, in a list or between commas: svf and asvf (0 .. 1), openness and openness-neg (degrees, 90 on a
-              plane), dominance (1 on a level plane), ao (visibility, 1 = open), dtm (heights), source (0 = no data, 1 = measured)
+              plane), dominance (1 on a level plane), ao (visibility, 1 = open), error (expected RMSE of svf), dtm
+              (heights), source (0 = no data, 1 = measured)
     settings: of `scanshade relief`, by name: radius=10 (m; 0 = 10 cells), directions=16, definition="horizontal", profile="rvt"
 
     Values have the bits that the program writes. Raises Error for wrong shapes, types, files and settings. Warns (Doubt) of what

@@ -29,8 +29,9 @@ inline std::map<std::string, cv::Mat1f> relief(const scanshade_heights& heights,
 }
 } // namespace detail
 
-/// Maps by name (svf, asvf, openness, openness-neg, dominance, ao, dtm, source), as large as `heights`: metres, rows
-/// from north to south, NaN = no data. `cell_m`: side of a cell. Settings are those of the program's `relief`, such as
+/// Maps by name (svf, asvf, openness, openness-neg, dominance, ao, error, dtm, source), as large as `heights`: metres,
+/// rows from north to south, NaN = no data. `cell_m`: side of a cell. Settings are those of the program's `relief`,
+/// such as
 /// {"radius", "10"} (metres). Throws Error.
 [[nodiscard]] inline std::map<std::string, cv::Mat1f>
 relief(const cv::Mat1f& heights, double cell_m, const std::vector<std::string>& maps, const Settings& settings = {}) {
