@@ -253,13 +253,13 @@ class Chunk {
         Layers& layers = job_.layers;
         scale(layers.svf, share, job_.settings.definition == Definition::surface ? &up : nullptr);
         scale(layers.asvf, 1 / job_.sum_of_brightness, nullptr);
-        scale(layers.openness, share, nullptr);
-        scale(layers.openness_neg, share, nullptr);
+        scale(layers.openness, share, nullptr, 128);
+        scale(layers.openness_neg, share, nullptr, 128);
         scale(layers.ao, share_of(job_.ball), &up);
     }
 
     /// NaN where the field is.
-    void scale(cv::Mat1f& layer, float share, const Row* up) {
+    void scale(cv::Mat1f& layer, float share, const Row* up, float largest = 1) {
         if (layer.empty())
             return;
         float* values = layer[row_ - job_.first] + column_;
@@ -268,6 +268,10 @@ class Chunk {
             values[x] *= share;
         for (int x = 0; up && x < count_; ++x)
             values[x] *= (*up)[x];
+        // To 2^-17 of the largest value, far below the error of directions: files are a quarter smaller.
+        const float coarse = largest * 96;
+        for (int x = 0; exact_ && x < count_; ++x)
+            values[x] = (values[x] + coarse) - coarse;
         for (int x = 0; x < count_; ++x)
             values[x] = std::isnan(heights[x]) ? heights[x] : values[x];
     }
@@ -276,6 +280,7 @@ class Chunk {
 
     const Job& job_;
     int row_, column_, count_;
+    bool exact_ = job_.settings.profile == Profile::exact;
     Row east_, north_, plane_;
     Horizons horizons_;
 };

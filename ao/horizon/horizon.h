@@ -61,8 +61,8 @@ struct Wanted {
     bool svf = false, asvf = false, openness = false, openness_neg = false, dominance = false, ao = false;
 };
 
-/// As wide as the field, a row for each that was asked for; those not wanted are empty. NaN where the field has no
-/// data, and only there.
+/// Profile exact: rounded to 2^-17, openness to 2^-10 degrees. As wide as the field, a row for each that was asked for;
+/// those not wanted are empty. NaN where the field has no data, and only there.
 struct Layers {
     cv::Mat1f svf;          ///< 0 .. 1
     cv::Mat1f asvf;         ///< anisotropic, of the solid angle: 0 .. 1

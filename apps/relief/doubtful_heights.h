@@ -14,6 +14,8 @@ class DoubtfulHeights {
   public:
     /// Heights in the file's unit, less `base`; NaN = no data.
     void add(const cv::Mat1f& z, double base);
+    /// Cells with a height.
+    [[nodiscard]] std::int64_t known() const { return zeros_ + others_; }
     /// A sentence for each kind found.
     [[nodiscard]] std::vector<std::string> notes() const;
 

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <optional>
+#include <tbb/task_group.h>
 
 namespace scanshade::relief {
 
@@ -204,6 +205,31 @@ class RowWindow {
     int begin_ = 0, end_ = 0; ///< rows in z_
 };
 
+/// Bands are written while the next one is read and computed.
+class Writing {
+  public:
+    Writing() = default;
+    Writing(const Writing&) = delete;
+    Writing& operator=(const Writing&) = delete;
+    ~Writing() {
+        tasks_.cancel(); // only a failure leaves any
+        (void)tasks_.wait();
+    }
+    template <class Action>
+    void add(int band, Action action) {
+        if (band != band_)
+            wait();
+        band_ = band;
+        tasks_.run(std::move(action));
+    }
+    /// Throws what the actions have thrown.
+    void wait() { tasks_.wait(); }
+
+  private:
+    tbb::task_group tasks_;
+    int band_ = -1;
+};
+
 } // namespace
 
 const std::vector<std::string>& map_names() {
@@ -266,7 +292,6 @@ std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, c
             wanted.*row_of(layer).wanted = true;
     RowWindow window(raster);
     DoubtfulHeights doubtful;
-    std::int64_t known = 0;
     const bool error = std::ranges::find(settings.write, "error") != settings.write.end();
     const double sigma = sigma_of(raster, settings.height_noise_m);
     const int reach =
@@ -277,7 +302,6 @@ std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, c
         const HeightField field{window.rows(begin, end), raster.grid.cell};
         const cv::Range own(first - begin, last - begin);
         const cv::Mat1f z = field.z.rowRange(own);
-        known += cv::countNonZero(measured_cells(z));
         doubtful.add(z, raster.base);
         const Layers layers = layers_of(field, walk, wanted, own);
         for (const std::string& layer : settings.write)
@@ -294,7 +318,7 @@ std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, c
                  layers_of(field, of_sky(walk, svfs_views()[i].sky), {.svf = true}, own).svf);
     }
     std::ranges::move(doubtful.notes(), std::back_inserter(raster.notes));
-    return known;
+    return doubtful.known();
 }
 
 Maps maps_of(const Heights& heights, const MapSettings& settings) {
@@ -333,6 +357,7 @@ Written write_maps(const std::string& name, const Heights& heights, const MapSet
         zip.emplace(*file, heights.rows.size, grid, text_of("svf", of_sky(walk, Sky::whole)));
     if (kept)
         *kept = empty_maps(settings, heights.rows.size);
+    Writing writing;
     const std::int64_t known =
         compute_maps(heights, settings, [&](const std::string& layer, int first, const cv::Mat& rows) {
             for (std::size_t i = 0; zip && i < svfs_views().size(); ++i)
@@ -340,10 +365,13 @@ Written write_maps(const std::string& name, const Heights& heights, const MapSet
                     return zip->write(i, rows);
             for (Output& output : outputs)
                 if (output.layer == layer)
-                    output.writer.write(output.bytes ? cv::Mat(stretched(rows, layer)) : rows);
+                    writing.add(first, [&output, rows] {
+                        output.writer.write(output.bytes ? cv::Mat(stretched(rows, output.layer)) : rows);
+                    });
             if (kept)
                 put(*kept, layer, first, rows);
         });
+    writing.wait();
     for (Output& output : outputs)
         output.writer.finish();
     if (zip)
