@@ -2,6 +2,7 @@
 
 #include "ao/horizon/view_error.h"
 #include "apps/relief/doubtful_heights.h"
+#include "apps/relief/gridding.h"
 #include "apps/relief/svfs.h"
 #include "projection/base/memory.h"
 
@@ -168,41 +169,54 @@ double sigma_of(const rasters::RasterReader& raster, double noise_m) {
     return std::hypot(noise_m / raster.grid.crs.height_unit_m, rounding);
 }
 
-/// Errors of heights in rows of the raster: those of a survey, or drawn.
-cv::Mat1f errors_of(const Heights& heights, double sigma, cv::Range rows) {
-    if (!heights.errors.empty())
-        return heights.errors.rowRange(rows);
+/// Errors of a raster's heights, drawn.
+cv::Mat1f drawn_errors(double sigma, int first, cv::Size size) {
     if (sigma == 0)
         return {};
     constexpr unsigned stream = 5;
-    cv::Mat1f errors(rows.size(), heights.rows.size.width);
+    cv::Mat1f errors(size);
     for (int r = 0; r < errors.rows; ++r)
         for (int c = 0; c < errors.cols; ++c)
-            errors(r, c) = static_cast<float>(sigma) * horizon::drawn_error(rows.start + r, c, 0, stream);
+            errors(r, c) = static_cast<float>(sigma) * drawn_error(first + r, c, 0, stream);
     return errors;
 }
 
 /// The rows of a raster that a band needs, each read once.
 class RowWindow {
   public:
-    explicit RowWindow(rasters::RasterReader& raster) : raster_(raster) {}
-    /// Bands follow one another: neither number falls.
-    cv::Mat1f rows(int begin, int end) {
-        cv::Mat1f z(end - begin, raster_.size.width);
-        if (begin < end_)
-            z_.rowRange(begin - begin_, end_ - begin_).copyTo(z.rowRange(0, end_ - begin));
-        const int from = std::max(begin, end_);
-        cv::Mat1f more = z.rowRange(from - begin, end - begin);
-        if (!more.empty())
-            raster_.read(from, more);
-        z_ = z, begin_ = begin, end_ = end;
-        return z;
+    explicit RowWindow(const Heights& heights) : heights_(heights) {}
+    /// Bands follow one another: neither number falls. What is not known of a raster stays empty.
+    SurfaceRows rows(int begin, int end) {
+        const cv::Size size(heights_.rows.size.width, end - begin);
+        SurfaceRows more{cv::Mat1f(size), {}, {}};
+        const int from = std::max(begin, end_), kept = std::max(end_ - begin, 0);
+        cv::Mat1f z = more.z.rowRange(kept, size.height);
+        if (!z.empty())
+            heights_.rows.read(from, z);
+        take_over(rows_.z, {}, begin, kept, more.z);
+        if (const SurfaceReader* surface = heights_.surface) {
+            more.source.create(size);
+            take_over(rows_.source, z.empty() ? cv::Mat() : cv::Mat(surface->source), begin, kept, more.source);
+            if (!surface->errors.empty() || !rows_.errors.empty()) {
+                more.errors.create(size);
+                take_over(rows_.errors, z.empty() ? cv::Mat() : cv::Mat(surface->errors), begin, kept, more.errors);
+            }
+        }
+        rows_ = more, begin_ = begin, end_ = end;
+        return more;
     }
 
   private:
-    rasters::RasterReader& raster_;
-    cv::Mat1f z_;
-    int begin_ = 0, end_ = 0; ///< rows in z_
+    void take_over(const cv::Mat& before, const cv::Mat& read, int begin, int kept, const cv::Mat& rows) const {
+        if (kept > 0)
+            before.rowRange(begin - begin_, end_ - begin_).copyTo(rows.rowRange(0, kept));
+        if (!read.empty())
+            read.copyTo(rows.rowRange(kept, rows.rows));
+    }
+
+    const Heights& heights_;
+    SurfaceRows rows_;
+    int begin_ = 0, end_ = 0; ///< rows in it
 };
 
 /// Bands are written while the next one is read and computed.
@@ -290,7 +304,7 @@ std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, c
     for (const std::string& layer : settings.write)
         if (row_of(layer).wanted)
             wanted.*row_of(layer).wanted = true;
-    RowWindow window(raster);
+    RowWindow window(heights);
     DoubtfulHeights doubtful;
     const bool error = std::ranges::find(settings.write, "error") != settings.write.end();
     const double sigma = sigma_of(raster, settings.height_noise_m);
@@ -299,7 +313,8 @@ std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, c
     for (int first = 0; first < raster.size.height; first += band_rows) {
         const int last = std::min(first + band_rows, raster.size.height);
         const int begin = std::max(first - reach, 0), end = std::min(last + reach, raster.size.height);
-        const HeightField field{window.rows(begin, end), raster.grid.cell};
+        const SurfaceRows rows = window.rows(begin, end);
+        const HeightField field{rows.z, raster.grid.cell};
         const cv::Range own(first - begin, last - begin);
         const cv::Mat1f z = field.z.rowRange(own);
         doubtful.add(z, raster.base);
@@ -308,11 +323,14 @@ std::int64_t compute_maps(const Heights& heights, const MapSettings& settings, c
             if (const MapRow& row = row_of(layer); row.layer)
                 take(layer, first, layers.*row.layer);
             else if (layer == "error")
-                take(layer, first, svf_error_of(field, walk, errors_of(heights, sigma, {begin, end}), own, begin));
+                take(layer, first,
+                     svf_error_of(field, walk,
+                                  heights.surface ? rows.errors : drawn_errors(sigma, begin, field.z.size()), own,
+                                  begin));
             else if (layer == "dtm")
                 take(layer, first, raster.base == 0 ? cv::Mat(z) : cv::Mat(z + raster.base));
             else
-                take(layer, first, heights.source.empty() ? measured_cells(z) : heights.source.rowRange(first, last));
+                take(layer, first, heights.surface ? rows.source.rowRange(own) : measured_cells(z));
         for (std::size_t i = 0; settings.svfs && i < svfs_views().size(); ++i)
             take(views_folder + svfs_views()[i].name, first,
                  layers_of(field, of_sky(walk, svfs_views()[i].sky), {.svf = true}, own).svf);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/horizon/horizon.h"
+#include "apps/relief/surface.h"
 #include "io/rasters/raster.h"
 
 #include <cstdint>
@@ -43,8 +44,7 @@ struct MapSettings {
 /// What maps are made of.
 struct Heights {
     rasters::RasterReader& rows;
-    cv::Mat1b source{}; ///< of each cell; empty where the input is a raster
-    cv::Mat1f errors{}; ///< a draw of the errors of heights, in their unit; empty where the input is a raster
+    SurfaceReader* surface = nullptr; ///< the same, where it is the surface of points
 };
 
 /// A map of `write` and its values: floats, `source` bytes.

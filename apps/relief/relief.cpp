@@ -122,32 +122,60 @@ class Relief final : public Command {
 
     void map_survey(const std::vector<fs::path>& files) {
         const Stopwatch stopwatch;
-        const SurveyPoints survey = read_survey(files);
-        for (const std::string& warning : survey.warnings)
-            fmt::print(stderr, "{}\n", warning);
         const std::string what =
             files.size() == 1 ? files.front().string() : fmt::format("{} files of points", files.size());
-        SurfaceOptions options = settings_.surface;
-        options.errors = std::ranges::find(settings_.maps.write, "error") != settings_.maps.write.end();
-        options.height_noise_m = settings_.maps.height_noise_m;
-        const SurfaceRaster surface = during(what, [&] { return surface_of(survey, options); });
         // Many files are named by their folder.
         const std::string name =
             files.size() == 1 ? name_of(files.front()) : name_of(fs::absolute(files.front()).parent_path());
-        rasters::MemoryReader heights(surface.raster);
+        SurfaceOptions options = settings_.surface;
+        options.errors = std::ranges::find(settings_.maps.write, "error") != settings_.maps.write.end();
+        options.height_noise_m = settings_.maps.height_noise_m;
+        SurveyPoints survey;
+        const bool fits = read_within(files, survey);
+        if (!fits) {
+            survey = {};
+            const auto heights = during(what, [&] { return open_surface(files, options, survey.warnings); });
+            print(survey.warnings);
+            during(what, [&] {
+                claim(map_files(name, heights->grid, settings_.maps, out_));
+                map(name, what, {*heights, heights.get()}, stopwatch, nullptr);
+            });
+            return;
+        }
+        print(survey.warnings);
+        const SurfaceRaster surface = during(what, [&] { return surface_of(survey, options); });
+        SurfaceInMemory heights(surface);
         heights.notes.insert(heights.notes.begin(), survey.notes.begin(), survey.notes.end());
         Maps maps;
         during(what, [&] {
             claim(map_files(name, heights.grid, settings_.maps, out_));
             if (settings_.points)
                 claim(point_files(survey, out_));
-            map(name, what, {heights, surface.source, surface.errors}, stopwatch, settings_.points ? &maps : nullptr);
+            map(name, what, {heights, &heights}, stopwatch, settings_.points ? &maps : nullptr);
         });
         if (!settings_.points)
             return;
         write_points(survey, cells_of_points(survey, surface, settings_.surface.surface), maps,
                      point_files(survey, out_));
         report(point_files(survey, out_));
+    }
+
+    /// False where the points do not fit into memory, unless they are to be written.
+    bool read_within(const std::vector<fs::path>& files, SurveyPoints& survey) const {
+        constexpr double bytes_each = 26;
+        const double most = settings_.memory_mib * (1 << 20) / bytes_each;
+        for (const fs::path& file : files) {
+            add_file(survey, file);
+            if (!settings_.points && static_cast<double>(survey.points.size()) > most)
+                return false;
+        }
+        finish_notes(survey);
+        return true;
+    }
+
+    static void print(const std::vector<std::string>& warnings) {
+        for (const std::string& warning : warnings)
+            fmt::print(stderr, "{}\n", warning);
     }
 
     /// Files to be written, which must be new.

@@ -10,8 +10,9 @@ namespace scanshade::relief {
 struct ReliefSettings {
     SurfaceOptions surface;
     MapSettings maps{.walk = {.radius = 0, .dominance = {}}};
-    int band = 0;        ///< of a raster; 0 = the only one
-    bool points = false; ///< the cloud with values, too
+    int band = 0;             ///< of a raster; 0 = the only one
+    bool points = false;      ///< the cloud with values, too
+    double memory_mib = 2048; ///< for points of a survey
 
     /// "input": of files. "maps": what is computed.
     [[nodiscard]] std::vector<Stage> stages();

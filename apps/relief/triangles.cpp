@@ -54,9 +54,10 @@ cv::Mat1f heights_at_centres(const std::vector<Vertex>& vertices, cv::Size size,
         vertex_of[id] = &vertex;
     };
     // Rows there and back: each point is near the one before it, from where it is looked for.
-    for (std::size_t begin = 0, row = 0; begin < vertices.size(); ++row) {
+    for (std::size_t begin = 0; begin < vertices.size();) {
+        const int row = vertices[begin].cell / size.width;
         std::size_t end = begin;
-        while (end < vertices.size() && vertices[end].cell / size.width == vertices[begin].cell / size.width)
+        while (end < vertices.size() && vertices[end].cell / size.width == row)
             ++end;
         for (std::size_t i = begin; i < end; ++i)
             insert(vertices[row % 2 == 0 ? i : begin + end - 1 - i]);
@@ -74,8 +75,10 @@ cv::Mat1f heights_at_centres(const std::vector<Vertex>& vertices, cv::Size size,
             ours = ours && corner != nullptr;
             edge = subdivision.getEdge(edge, cv::Subdiv2D::NEXT_AROUND_LEFT);
         }
-        if (ours)
-            draw(triangle, z, errors);
+        if (!ours)
+            continue;
+        std::ranges::sort(triangle, {}, &Vertex::cell); // the same numbers wherever its edges begin
+        draw(triangle, z, errors);
     }
     return z;
 }

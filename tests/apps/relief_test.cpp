@@ -300,6 +300,98 @@ TEST(Relief, expected_errors_grow_with_noise_and_near_gaps) {
     EXPECT_NEAR(std::sqrt(sum / 600), 0.07 / 2, 0.01); // four points a cell
 }
 
+/// Four files of a quarter each, with classes. In cells of 10 cm it has several blocks.
+std::vector<fs::path> made_tiles(const tests::TemporaryFolder& folder) {
+    SurveyPoints survey = made_survey(true);
+    std::mt19937 random(8);
+    std::normal_distribution<double> normal(0, 0.03);
+    std::vector<fs::path> files;
+    for (int tile = 0; tile < 4; ++tile) {
+        std::vector<Eigen::Vector3d> points;
+        std::vector<float> classes;
+        for (std::size_t i = 0; i < survey.points.size(); ++i)
+            if (const Eigen::Vector3d& p = survey.points[i];
+                (p.x() > 30) == (tile % 2 == 1) && (p.y() > 30) == (tile > 1)) {
+                points.emplace_back(p + Eigen::Vector3d(0, 0, normal(random)));
+                classes.push_back(survey.classes[i]);
+            }
+        files.push_back(folder / fmt::format("tile{}.ply", tile));
+        write_new_ply(files.back(), points, {}, {{"classification", classes}});
+    }
+    return files;
+}
+
+/// Rows that are read when they are needed, files from the north on: the bits of one piece.
+TEST(Relief, surveys_read_by_rows_have_the_bits_of_those_in_memory) {
+    const tests::TemporaryFolder folder;
+    const std::vector<fs::path> files = made_tiles(folder);
+    for (const Surface kind : {Surface::ground, Surface::top, Surface::all}) {
+        const SurfaceOptions options{.surface = kind, .cell_m = 0.1, .fill_m = 1.5, .errors = true};
+        const SurfaceRaster whole = surface_of(read_survey(files), options);
+        std::vector<std::string> warnings;
+        const auto reader = open_surface(files, options, warnings);
+        ASSERT_EQ(reader->size, whole.raster.z.size());
+        EXPECT_EQ(reader->base, whole.raster.base);
+        EXPECT_EQ(reader->grid.y0, whole.raster.grid.y0);
+        const auto same = [](const cv::Mat& one, const cv::Mat& other) {
+            const cv::Mat a = one.clone(), b = other.clone();
+            return a.size() == b.size() && std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
+        };
+        for (int first = 0; first < reader->size.height; first += 77) {
+            const cv::Range rows(first, std::min(first + 77, reader->size.height));
+            cv::Mat1f z(rows.size(), reader->size.width);
+            reader->read(first, z);
+            EXPECT_TRUE(same(z, whole.raster.z.rowRange(rows))) << first;
+            EXPECT_TRUE(same(reader->source, whole.source.rowRange(rows))) << first;
+            EXPECT_TRUE(same(reader->errors, whole.errors.rowRange(rows))) << first;
+        }
+    }
+}
+
+/// Blocks lie on the map: a tile more changes nothing far from it.
+TEST(Relief, a_piece_of_a_survey_has_the_bits_of_the_whole) {
+    const tests::TemporaryFolder folder;
+    const std::vector<fs::path> files = made_tiles(folder);
+    const SurfaceOptions options{.cell_m = 0.1, .fill_m = 1.5};
+    const SurfaceRaster whole = surface_of(read_survey(files), options),
+                        south = surface_of(read_survey({files[0], files[1]}), options);
+    ASSERT_EQ(south.raster.base, whole.raster.base);
+    constexpr int far = 60; // cells: two fillings and more
+    int differ = 0, known = 0;
+    for (int r = far; r < south.raster.z.rows; ++r)
+        for (int c = 0; c < south.raster.z.cols; ++c) {
+            const float one = south.raster.z(r, c),
+                        other = whole.raster.z(whole.raster.z.rows - south.raster.z.rows + r, c);
+            differ += one != other && !(std::isnan(one) && std::isnan(other));
+            known += !std::isnan(one);
+        }
+    EXPECT_EQ(differ, 0);
+    EXPECT_GT(known, 100000);
+}
+
+TEST(Relief, the_program_reads_large_surveys_by_rows) {
+    const tests::TemporaryFolder folder;
+    made_tiles(folder);
+    const auto maps = [&](const std::string& out, const std::string& more) {
+        const tests::Ran ran =
+            tests::run_program(fmt::format("relief {} -o {} --cell 0.5 --write svf,error,source {}",
+                                           fs::path(folder / "").string(), (folder / out).string(), more));
+        EXPECT_EQ(ran.exit_code, all_well) << ran.err;
+        std::string bytes;
+        for (const fs::directory_entry& file : fs::directory_iterator(folder / out))
+            bytes += tests::file_bytes(file.path());
+        return bytes;
+    };
+    const std::string in_memory = maps("a", ""), by_rows = maps("b", "--memory 0");
+    EXPECT_GT(in_memory.size(), 1000U);
+    EXPECT_EQ(in_memory, by_rows);
+    const std::string unclassified = tests::write_file(folder / "c.xyz", "0 0 1\n3 0 1\n0 3 1\n").string();
+    const tests::Ran ran =
+        tests::run_program(fmt::format("relief {} -o {} --memory 0", unclassified, (folder / "c").string()));
+    EXPECT_EQ(ran.exit_code, nothing_done);
+    EXPECT_TRUE(says(ran.err, "--memory"));
+}
+
 tests::Ran run_relief(const std::string& words) { return tests::run_program("relief " + words); }
 
 fs::path made_dem(const fs::path& file) {

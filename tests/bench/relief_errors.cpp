@@ -86,8 +86,8 @@ relief::Maps maps_of_source(const HeightSource& source, const Terrain& terrain, 
         survey.ground_classified = source.classified;
         const relief::SurfaceRaster surface =
             relief::surface_of(survey, {.cell_m = source.cell_m, .fill_m = 8, .errors = true});
-        rasters::MemoryReader reader(surface.raster);
-        return relief::maps_of({reader, surface.source, surface.errors}, settings);
+        relief::SurfaceInMemory reader(surface);
+        return relief::maps_of({reader, &reader}, settings);
     }
     std::mt19937 random(seed);
     std::normal_distribution<float> normal(0, static_cast<float>(source.sigma_m));
