@@ -42,7 +42,7 @@ std::vector<std::string> DoubtfulHeights::notes() const {
     const auto add = [&](std::int64_t cells, double height, const std::string& why) {
         notes.push_back(
             fmt::format("{} cells have a height of {:g}{}: probably no data that the file does not declare. "
-                        "Cells around them are wrong; `gdal_edit.py -a_nodata {:g}` declares it.",
+                        "Cells around them are wrong. Declare it (`gdal_edit.py -a_nodata {:g}`), or use NaN.",
                         cells, height, why, height));
     };
     for (const auto& [height, cells] : sentinels_)

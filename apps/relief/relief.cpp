@@ -4,6 +4,7 @@
 #include "apps/relief/settings.h"
 #include "io/clouds/format.h"
 #include "io/files.h"
+#include "io/rasters/vrt.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 #include "projection/base/stopwatch.h"
@@ -105,6 +106,8 @@ class Relief final : public Command {
         };
         for (const fs::path& file : inputs.rasters)
             attempt([&] { map_raster(file); });
+        if (tiles_.size() > 1)
+            attempt([&] { join_tiles(name_of(fs::absolute(inputs.rasters.front()).parent_path())); });
         if (!inputs.clouds.empty())
             attempt([&] { map_survey(inputs.clouds); });
         return failed == 0 ? all_well : done == 0 ? nothing_done : some_failed;
@@ -117,6 +120,8 @@ class Relief final : public Command {
         during(file.string(), [&] {
             claim(map_files(name_of(file), heights->grid, settings_.maps, out_));
             map(name_of(file), file.string(), {*heights, {}}, stopwatch, nullptr);
+            tiles_.push_back({name_of(file), heights->size, heights->grid});
+            tile_files_.push_back(map_files(name_of(file), heights->grid, settings_.maps, out_));
         });
     }
 
@@ -178,6 +183,26 @@ class Relief final : public Command {
             fmt::print(stderr, "{}\n", warning);
     }
 
+    /// A virtual raster of each kind of map, where rasters lie on one grid.
+    void join_tiles(const std::string& name) {
+        if (!rasters::share_a_grid(tiles_))
+            return;
+        for (std::size_t i = 0; i < tile_files_.front().size(); ++i) {
+            const std::string first = tile_files_.front()[i].filename().string();
+            if (!first.ends_with(".tif"))
+                continue; // svfs.zip
+            std::vector<rasters::VrtTile> parts = tiles_;
+            for (std::size_t t = 0; t < parts.size(); ++t)
+                parts[t].file = tile_files_[t][i];
+            const std::string map = first.substr(tiles_.front().file.string().size(),
+                                                 first.size() - 4 - tiles_.front().file.string().size());
+            const fs::path file = fs::path(out_) / (name + map + ".vrt");
+            claim({file});
+            rasters::write_vrt(file, parts, map.ends_with("_8bit") || map == "_SOURCE" ? CV_8UC1 : CV_32FC1);
+            report({file});
+        }
+    }
+
     /// Files to be written, which must be new.
     void claim(const std::vector<fs::path>& files) {
         for (const fs::path& file : files) {
@@ -219,6 +244,8 @@ class Relief final : public Command {
     bool overwrite_ = false, quiet_ = false;
     ReliefSettings settings_;
     std::set<std::string> written_;
+    std::vector<rasters::VrtTile> tiles_; ///< rasters that were mapped, by the name of their maps
+    std::vector<std::vector<fs::path>> tile_files_;
 };
 
 } // namespace

@@ -1,6 +1,7 @@
 // GDAL's virtual rasters: a text that puts parts of other rasters side by side. Sources at the scale 1:1 only.
 #include "io/rasters/vrt.h"
 
+#include "io/output_file.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
@@ -9,6 +10,7 @@
 #include <fmt/format.h>
 #include <optional>
 #include <pugixml.hpp>
+#include <sstream>
 
 namespace scanshade::rasters {
 
@@ -63,6 +65,18 @@ Source source_of(const pugi::xml_node& node, const fs::path& file) {
     return source;
 }
 
+/// Well-known text, or a code such as EPSG:32633.
+Crs crs_of_srs(const std::string& srs) {
+    const auto code = srs.starts_with("EPSG:") ? number(std::string_view(srs).substr(5)) : std::nullopt;
+    if (!code)
+        return crs_of_text(srs);
+    constexpr int first_geographic = 4000, last_geographic = 4999; // of EPSG's codes
+    const bool geographic = *code >= first_geographic && *code <= last_geographic;
+    GeoKeys keys = with_value({}, 1024, geographic ? 2 : 1);
+    keys = with_value(std::move(keys), 1025, 1);
+    return crs_of_keys(with_value(std::move(keys), geographic ? 2048 : 3072, static_cast<int>(*code)));
+}
+
 Grid grid_of(const pugi::xml_node& top, const fs::path& file, std::vector<std::string>& notes) {
     Grid grid;
     std::string text = top.child("GeoTransform").text().get();
@@ -76,7 +90,7 @@ Grid grid_of(const pugi::xml_node& top, const fs::path& file, std::vector<std::s
         refuse(file, fmt::format("its GeoTransform is {}, expected square cells with north up", in_quotes(text)));
     grid.x0 = v[0], grid.cell = v[1], grid.y0 = v[3];
     if (const std::string srs = top.child("SRS").text().get(); !srs.empty())
-        grid.crs = during(file.string(), [&] { return crs_of_text(srs); });
+        grid.crs = during(file.string(), [&] { return crs_of_srs(srs); });
     if (grid.crs.geographic)
         refuse(file, "coordinates are degrees, in which slopes mean nothing; project it first, such as by `gdalwarp "
                      "-t_srs EPSG:CODE`");
@@ -203,6 +217,67 @@ std::unique_ptr<RasterReader> open_vrt(const fs::path& file, int band) {
         refuse(file, "a virtual raster without sources");
     return std::make_unique<VrtReader>(file, cv::Size(width, height), std::move(grid), std::move(notes),
                                        std::move(sources), changed);
+}
+
+bool share_a_grid(const std::vector<VrtTile>& tiles) {
+    constexpr double least = 1e-3; // cells
+    return std::ranges::all_of(tiles, [&](const VrtTile& tile) {
+        const Grid &one = tiles.front().grid, &other = tile.grid;
+        const auto whole = [&](double distance) {
+            return std::abs(distance / one.cell - std::nearbyint(distance / one.cell)) < least;
+        };
+        return one.crs.epsg == other.crs.epsg && one.crs.text == other.crs.text && one.crs.unit_m == other.crs.unit_m &&
+               std::abs(one.cell - other.cell) < 1e-9 * one.cell && whole(other.x0 - one.x0) &&
+               whole(other.y0 - one.y0);
+    });
+}
+
+void write_vrt(const fs::path& file, const std::vector<VrtTile>& tiles, int type) {
+    const Grid& grid = tiles.front().grid;
+    double west = grid.x0, north = grid.y0;
+    for (const VrtTile& tile : tiles)
+        west = std::min(west, tile.grid.x0), north = std::max(north, tile.grid.y0);
+    const auto place_of = [&](const VrtTile& tile) {
+        return cv::Rect(cv::Point(static_cast<int>(std::lround((tile.grid.x0 - west) / grid.cell)),
+                                  static_cast<int>(std::lround((north - tile.grid.y0) / grid.cell))),
+                        tile.size);
+    };
+    cv::Rect all(0, 0, 1, 1);
+    for (const VrtTile& tile : tiles)
+        all |= place_of(tile);
+    pugi::xml_document document;
+    pugi::xml_node top = document.append_child("VRTDataset");
+    top.append_attribute("rasterXSize").set_value(all.width);
+    top.append_attribute("rasterYSize").set_value(all.height);
+    if (const std::string& text = grid.crs.text; grid.crs.epsg > 0 || !text.empty())
+        top.append_child("SRS").text().set((text.empty() ? fmt::format("EPSG:{}", grid.crs.epsg) : text).c_str());
+    top.append_child("GeoTransform")
+        .text()
+        .set(fmt::format("{:.17g}, {:.17g}, 0, {:.17g}, 0, {:.17g}", west, grid.cell, north, -grid.cell).c_str());
+    pugi::xml_node band = top.append_child("VRTRasterBand");
+    band.append_attribute("dataType").set_value(type == CV_32FC1 ? "Float32" : "Byte");
+    band.append_attribute("band").set_value(1);
+    if (type == CV_32FC1)
+        band.append_child("NoDataValue").text().set("nan");
+    const auto add_rectangle = [](pugi::xml_node to, const char* name, const cv::Rect& at) {
+        pugi::xml_node node = to.append_child(name);
+        node.append_attribute("xOff").set_value(at.x), node.append_attribute("yOff").set_value(at.y);
+        node.append_attribute("xSize").set_value(at.width), node.append_attribute("ySize").set_value(at.height);
+    };
+    for (const VrtTile& tile : tiles) {
+        pugi::xml_node source = band.append_child(type == CV_32FC1 ? "ComplexSource" : "SimpleSource");
+        pugi::xml_node name = source.append_child("SourceFilename");
+        name.append_attribute("relativeToVRT").set_value(1);
+        name.text().set(fs::absolute(tile.file).lexically_relative(fs::absolute(file).parent_path()).c_str());
+        source.append_child("SourceBand").text().set(1);
+        add_rectangle(source, "SrcRect", cv::Rect(cv::Point(), tile.size));
+        add_rectangle(source, "DstRect", place_of(tile));
+        if (type == CV_32FC1)
+            source.append_child("NODATA").text().set("nan");
+    }
+    std::ostringstream text;
+    document.save(text, "  ", pugi::format_default | pugi::format_no_declaration);
+    write_atomically(file, text.str());
 }
 
 } // namespace scanshade::rasters

@@ -424,6 +424,30 @@ TEST(Relief, the_program_writes_maps_in_the_place_of_the_dem) {
     EXPECT_TRUE(fs::exists(folder / "out" / "dem_SVF_R10_D16_8bit.tif"));
 }
 
+/// Rasters beside each other: a virtual one of each map, which is read as they are.
+TEST(Relief, maps_of_tiles_are_joined_by_virtual_rasters) {
+    const tests::TemporaryFolder folder;
+    fs::create_directories(folder / "tiles");
+    const rasters::Raster west = rasters::read_raster(made_dem(folder / "tiles" / "a.tif"));
+    rasters::Grid grid = west.grid;
+    grid.x0 += 50 * grid.cell, grid.y0 += 3 * grid.cell;
+    rasters::write_raster(folder / "tiles" / "b.tif", west.z, grid, {});
+    ASSERT_EQ(run_relief(fmt::format("{} -o {} --write svf,source,8bit", (folder / "tiles").string(),
+                                     (folder / "out").string()))
+                  .exit_code,
+              all_well);
+    const rasters::Raster joined = rasters::read_raster(folder / "out" / "tiles_SVF_R10_D16.vrt"),
+                          tile = rasters::read_raster(folder / "out" / "b_SVF_R10_D16.tif");
+    EXPECT_EQ(joined.z.size(), cv::Size(100, 43));
+    EXPECT_EQ(joined.grid.x0, west.grid.x0);
+    EXPECT_EQ(joined.grid.y0, grid.y0);
+    EXPECT_EQ(joined.grid.crs.epsg, 32633);
+    EXPECT_EQ(joined.z(7, 57), tile.z(7, 7));
+    EXPECT_TRUE(std::isnan(joined.z(4, 55)) && std::isnan(joined.z(0, 0)) && !std::isnan(joined.z(3, 0)));
+    EXPECT_TRUE(fs::exists(folder / "out" / "tiles_SVF_R10_D16_8bit.vrt"));
+    EXPECT_TRUE(fs::exists(folder / "out" / "tiles_SOURCE.vrt"));
+}
+
 TEST(Relief, exit_codes_tell_misuse_from_bad_inputs) {
     const tests::TemporaryFolder folder;
     const std::string dem = made_dem(folder / "dem.tif").string(), out = (folder / "out").string();
