@@ -12,7 +12,7 @@ struct ReliefSettings {
     MapSettings maps{.walk = {.radius = 0, .dominance = {}}};
     int band = 0;             ///< of a raster; 0 = the only one
     bool points = false;      ///< the cloud with values, too
-    double memory_mib = 2048; ///< for points of a survey
+    double memory_mib = 1024; ///< for points of a survey
 
     /// "input": of files. "maps": what is computed.
     [[nodiscard]] std::vector<Stage> stages();
