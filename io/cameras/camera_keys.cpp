@@ -23,8 +23,9 @@ struct KeyLine {
     std::string value; ///< lower case, without quotes
 };
 
+/// In lower case, as JSON can hold it.
 std::string lower(std::string_view text) {
-    std::string result(text);
+    std::string result = as_utf8(text);
     std::ranges::transform(result, result.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     return result;
 }

@@ -565,6 +565,8 @@ bool is_text_cloud(std::string_view start) {
 CloudRecords read_xyz(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
     const std::optional<std::string> usual = usual_text(bytes);
     bytes = usual ? *usual : bytes;
+    if (bytes.empty())
+        throw Error(file.string() + ": a byte order mark and no text, expected a cloud");
     const std::optional<std::string> of_cells = words_for_cells(bytes);
     bytes = of_cells ? *of_cells : bytes;
     const TextHeader header = text_header(bytes);

@@ -265,6 +265,7 @@ TEST(CamerasOfOthersRefused, say_what_they_are_and_what_was_expected) {
                                "f0: [*e,*e,*e,*e,*e,*e,*e,*e,*e,*e]\n"),
                      "too many values for a camera"));
     EXPECT_TRUE(says(complaint("k.txt", "fx: 140\nfy: 141\ncx: 79.5\n"), "\"cy\" is missing"));
+    EXPECT_TRUE(says(complaint("u.txt", "fx: 140\nfy: \xff\x8c\ncx: 1\ncy: 1\n"), "\"fy\" is")) << "no UTF-8";
     EXPECT_TRUE(says(complaint("n.txt", "fx: 140\nfy: wide\ncx: 79.5\ncy: 1\n"), "\"fy\" is"));
     EXPECT_TRUE(says(complaint("t.txt", "Camera.fx: 140\nCamera.fx: 150\n"), "line 2: \"fx\" is there twice"));
 }

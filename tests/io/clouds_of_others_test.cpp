@@ -190,6 +190,7 @@ TEST(TextCloudsRefused, name_the_line_and_the_column) {
     };
     const std::string words = rows(",", [](int) { return ",wall"; });
     EXPECT_TRUE(says(complaint("class.csv", "x,y,z,class\n" + words), "line 2: \"wall\" in column 4 (class)"));
+    EXPECT_TRUE(says(complaint("e.xyz", "\xff\xfe"), "a byte order mark and no text"));
     EXPECT_TRUE(says(complaint("c.xyz", rows(" ") + "1 2\n"), "line 17: 2 values, expected 3"));
     EXPECT_TRUE(
         says(complaint("n.xyz", "east west\n" + rows(" ")), "line 1: \"east west\", expected numbers, or names"));
