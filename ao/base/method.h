@@ -140,7 +140,8 @@ struct PointSet {
     std::span<const Eigen::Vector3d> seen_from = {}; ///< the camera of each, where cameras are known; else empty
     std::span<const Station> stations = {};          ///< as a file of several scans says; empty = it does not
     std::span<const Splat> splats = {};              ///< what is about each point; empty = they are points of surfaces
-    std::span<const FoundFrame> frames = {}; ///< the depth frames of all as their file says, or splats' cameras, or none
+    std::span<const FoundFrame> frames =
+        {}; ///< the depth frames of all as their file says, or splats' cameras, or none
 };
 
 /// Values of points, and what was chosen on the way.
