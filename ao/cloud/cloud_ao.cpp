@@ -56,6 +56,10 @@ PointVisibility CloudAo::of_scans(PointSet cloud, const std::optional<Vector3d>&
     PointVisibility result = compute(cloud, scanner);
     result.timings.insert(result.timings.begin(), {"stations", judged_ms});
     result.notes.push_back(found.note);
+    constexpr double unlikely = 0.01; // that the opposite of the sides found is right
+    for (Finding& finding : result.findings)
+        if (found.contradict && finding.check == Check::sides && finding.value > unlikely && finding.sentence.empty())
+            finding.sentence = found.note + " So they tell no sides; --cloud.outside sets them.";
     if (on_planes && believed)
         at_most(result.findings, Check::normals_to_station, found.opposed, hardly_opposed, [&] {
             return fmt::format("{:.0f} % of the recorded normals face away from the scanner that recorded them; they "

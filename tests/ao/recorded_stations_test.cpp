@@ -196,7 +196,10 @@ TEST(RecordedStations, decide_what_the_cloud_cannot) {
         box.normals.push_back(normal);
     }
     box.starts = {0, 30000};
-    EXPECT_FALSE(doubts_in(computed(box, {}).findings).empty());
+    const PointVisibility alone = computed(box, {});
+    const auto sides = std::ranges::find(alone.findings, Check::sides, &Finding::check);
+    ASSERT_NE(sides, alone.findings.end());
+    EXPECT_GT(sides->value, 0.02) << "a room by its height, and that is a guess";
     const PointVisibility found = computed(box, {{10.4, 19.7, 5.1}, {9.3, 20.5, 4.8}});
     EXPECT_TRUE(doubts_in(found.findings).empty()) << said(found);
     EXPECT_LT(wrong_sides(found, box), 0.001);

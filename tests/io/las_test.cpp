@@ -377,7 +377,7 @@ TEST(TextClouds, columns_are_told_by_their_values) {
     EXPECT_EQ(names("1 2 3 200 100 0\n4 5 6 1 0 0\n"), "x y z red green blue");
     EXPECT_EQ(names("1 2 3 0 0 1\n4 5 6 0.6 -0.8 0\n"), "x y z nx ny nz");
     EXPECT_EQ(names("1 2 3 0 0 1\n4 5 6 1 0 0\n"), "x y z nx ny nz") << "no colour is as dark as that everywhere";
-    EXPECT_EQ(names("1 2 3 0.2 0.1 0.9\n4 5 6 0 0 0\n"), "x y z column_4 column_5 column_6");
+    EXPECT_EQ(names("1 2 3 0.2 0.1 1.9\n4 5 6 0 0 0\n"), "x y z column_4 column_5 column_6");
     EXPECT_EQ(names("1 2 3 -1270 40 50 60\n4 5 6 -900 1 2 3\n"), "x y z intensity red green blue");
     EXPECT_EQ(names("1 2 3 40 50 60 0.25\n4 5 6 1 2 3 0.5\n"), "x y z red green blue column_7") << "an AO of ours, say";
     EXPECT_EQ(names("1 2 3 40 50 60 0 0 1\n4 5 6 1 2 3 0 1 0\n"), "x y z red green blue nx ny nz");

@@ -115,7 +115,9 @@ RecordedStations recorded_stations(std::span<const Station> stations, std::span<
     found.opposed = static_cast<double>(all.opposed) / static_cast<double>(std::max<std::size_t>(all.visible, 1));
     found.agreement = surface.agreement;
     const double visible = all.share(all.visible), least = seen[worst].share(seen[worst].visible);
-    if (all_at_one_place(stations, seen))
+    const bool one_place = all_at_one_place(stations, seen);
+    found.contradict = !one_place && (visible < most || (seen[worst].tests >= enough && least < some));
+    if (one_place)
         found.note = "where the scanners stood is not used: all scans name the same position.";
     else if (visible < most)
         found.note = fmt::format("where the scanners stood is not used: only {:.0f} % of the points can be seen from "

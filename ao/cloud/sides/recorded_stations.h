@@ -13,6 +13,7 @@ namespace scanshade {
 struct RecordedStations {
     std::vector<Eigen::Vector3d> seen_from; ///< the station of every point; empty where they cannot be right
     std::string note;                       ///< a sentence for people: how they were judged
+    bool contradict = false;                ///< they are places, and do not see the points
     double opposed = 0;   ///< of the recorded normals of points that their station sees: the share that faces away
     double agreement = 1; ///< of recorded normals with planes: CloudSurface::agreement
 };
