@@ -481,7 +481,8 @@ TEST(Relief, the_program_maps_any_cloud) {
 TEST(Relief, points_of_a_slope_are_of_its_surface) {
     SurveyPoints survey;
     for (int i = 0; i < 4000; ++i) {
-        const double x = i % 80 * 0.25, y = i / 80 * 0.4;
+        const int column = i % 80, row = i / 80;
+        const double x = column * 0.25, y = row * 0.4;
         survey.points.emplace_back(x, y, 2 * x - y);
     }
     survey.classes.assign(survey.points.size(), 2);

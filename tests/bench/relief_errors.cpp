@@ -68,12 +68,12 @@ std::vector<Eigen::Vector3d> with_plants(std::vector<Eigen::Vector3d> points, un
     return points;
 }
 
-relief::Maps maps_of_source(const HeightSource& source, const Terrain& terrain, unsigned seed, int side) {
+relief::Maps maps_of_source(const HeightSource& source, const Terrain& terrain, unsigned seed, int cells) {
     relief::MapSettings settings;
     settings.write = {"svf", "error"};
     settings.walk.radius = source.radius_cells * source.cell_m, settings.walk.directions = source.directions;
     settings.walk.profile = source.profile;
-    const double side_m = side * source.cell_m;
+    const double side_m = cells * source.cell_m;
     if (source.density > 0) {
         relief::SurveyPoints survey;
         survey.points =
@@ -91,14 +91,14 @@ relief::Maps maps_of_source(const HeightSource& source, const Terrain& terrain, 
     }
     std::mt19937 random(seed);
     std::normal_distribution<float> normal(0, static_cast<float>(source.sigma_m));
-    rasters::Raster raster{heights_of(terrain, side, source.cell_m), 0, {}, {}};
+    rasters::Raster raster{heights_of(terrain, cells, source.cell_m), 0, {}, {}};
     raster.grid.cell = source.cell_m;
     for (float& z : raster.z)
         z += source.sigma_m > 0 ? normal(random) : 0;
     if (source.rounding > 0)
         for (float& z : raster.z)
             z = static_cast<float>(std::round(z / source.rounding) * source.rounding);
-    for (const Eigen::Vector3d& disc : discs_of(side, source.missing, 8, seed))
+    for (const Eigen::Vector3d& disc : discs_of(cells, source.missing, 8, seed))
         cv::circle(raster.z, cv::Point(static_cast<int>(disc.x()), static_cast<int>(disc.y())),
                    static_cast<int>(disc.z()), cv::Scalar(NAN), cv::FILLED);
     settings.height_noise_m = source.sigma_m;

@@ -18,7 +18,7 @@ using tests::refusal;
 using tests::says;
 
 fs::path folder() {
-    const fs::path path = fs::path(testing::TempDir()) / "rasters_test";
+    fs::path path = fs::path(testing::TempDir()) / "rasters_test";
     fs::create_directories(path);
     return path;
 }
@@ -412,7 +412,7 @@ TEST(Rasters, rows_in_portions_are_those_of_the_whole) {
 
 TEST(Rasters, rows_in_portions_make_the_same_file) {
     write_raster(folder() / "at_once.tif", large_heights(), grid(), {"text", {}});
-    const cv::Mat1f z = large_heights();
+    const cv::Mat1f& z = large_heights();
     for (const int rows : {1, 100, 512, 600}) {
         RasterWriter writer(folder() / "portions.tif", z.size(), CV_32FC1, grid(), {"text", {}});
         for (int row = 0; row < z.rows; row += rows)
@@ -445,7 +445,7 @@ TEST(Rasters, a_written_raster_is_cloud_optimized) {
     EXPECT_TRUE(std::ranges::is_sorted(directories));
     EXPECT_TRUE(std::is_sorted(tiles.rbegin(), tiles.rend()));
     EXPECT_GT(tiles.back(), directories.back());
-    const cv::Mat1f z = large_heights();
+    const cv::Mat1f& z = large_heights();
     EXPECT_NEAR(first_tile(1, 1), (z(2, 2) + z(2, 3) + z(3, 2) + z(3, 3)) / 4, 1e-4);
     EXPECT_NEAR(first_tile(0, 0), (z(0, 1) + z(1, 0) + z(1, 1)) / 3, 1e-4);
 }

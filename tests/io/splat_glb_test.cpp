@@ -13,7 +13,6 @@ namespace {
 
 using nlohmann::json;
 using namespace tests;
-namespace fs = std::filesystem;
 using Eigen::Vector3d, Eigen::Vector3f;
 
 Cloud read(const TemporaryFolder& folder, const SplatGlb& file, std::vector<std::string>& warnings) {
