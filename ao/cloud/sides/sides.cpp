@@ -89,8 +89,11 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
         decision.sign = signs.rise > 0 ? inner : -inner;
     } else {
         constexpr double doubtful = 0.1, unlikely = 0.01; // probabilities of the other answer
-        const double probability = inner_probability(signs), wrong = std::min(probability, 1 - probability);
+        constexpr double hardly_explained = 0.7; // share of the points: among plants no station sees clean fronts
+        const double probability = inner_probability(signs);
         decision.sign = probability > 0.5 ? inner : -inner;
+        const bool nothing_known = !scene.up_known && covers[at(decision.sign)].share < hardly_explained;
+        const double wrong = nothing_known ? 0.5 : std::min(probability, 1 - probability);
         decision.body = decision.sign != inner && signs.fronts >= 0.9 && signs.afar >= 0.97;
         decision.sure = wrong < unlikely;
         const Stations::Cover& cover = covers[at(decision.sign)];
